@@ -1,0 +1,1 @@
+"""Boards, closed form, joint refinement and quality of the stereo calibration."""

@@ -1,0 +1,1 @@
+"""Whatever touches a disk or a device: videos, stamps, stores, sensors, prints, exports."""

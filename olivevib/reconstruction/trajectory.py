@@ -1,0 +1,105 @@
+"""Three-dimensional paths of the markers, each sample with its sigma and its own time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from olivevib.arrays import Bools, Floats, Ints, floats, ints
+from olivevib.signals import Samples, State
+
+
+@dataclass(frozen=True)
+class ContinuousFit:
+    """The continuous-time motion of one marker (sway spline + harmonics), where it was fitted.
+
+    Written by the fit above the frame rate; all arrays follow CONVENTIONS.md (continuous fit).
+    """
+
+    id: int
+    f_hz: float
+    knots_s: Floats  # (B,)
+    sway: Floats  # (6, B) mm and rad
+    cosine: Floats  # (H, 6)
+    sine: Floats  # (H, 6)
+    covariance: Floats  # of f_hz, cosine, sine: (1 + 12 H, 1 + 12 H)
+    t_ref_s: float
+    chi2: float
+    candidates_hz: tuple[float, ...] = ()
+    evidence: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Where each marker was, frame after frame.
+
+    t_s (N,) the frame's time on the trial clock; sample_t_s (N, M) the instant at which each marker
+    was seen (row and camera offset included); xyz_mm (N, M, 3) its centre, rotation_rad (N, M, 3)
+    rotation vector of its plane, with sigmas; covariance_mm2 (N, M, 3, 3); state (N, M) of State;
+    epipolar_px (N, M) signed epipolar distance before triangulation. NaN = not seen.
+    frame: "left camera", "board" or "gravity". method: "optimal", "linear-eigen" or "continuous".
+    """
+
+    t_s: Floats
+    ids: Ints
+    sample_t_s: Floats
+    xyz_mm: Floats
+    sigma_xyz_mm: Floats
+    covariance_mm2: Floats
+    rotation_rad: Floats
+    sigma_rotation_rad: Floats
+    state: Ints
+    epipolar_px: Floats
+    frame: str
+    method: str
+    fits: tuple[ContinuousFit, ...] = ()
+
+    def __post_init__(self) -> None:
+        t_s = floats("t_s", self.t_s, (None,))
+        ids = ints("ids", self.ids, (None,))
+        n, m = t_s.size, ids.size
+        shapes: dict[str, tuple[int, ...]] = {
+            "sample_t_s": (n, m),
+            "xyz_mm": (n, m, 3),
+            "sigma_xyz_mm": (n, m, 3),
+            "covariance_mm2": (n, m, 3, 3),
+            "rotation_rad": (n, m, 3),
+            "sigma_rotation_rad": (n, m, 3),
+            "epipolar_px": (n, m),
+        }
+        object.__setattr__(self, "t_s", t_s)
+        object.__setattr__(self, "ids", ids)
+        object.__setattr__(self, "state", ints("state", self.state, (n, m)))
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, floats(name, getattr(self, name), shape, nan=True))
+
+    @property
+    def seen(self) -> Bools:
+        """(N, M) True where a marker has a position."""
+        return np.asarray(np.isfinite(self.xyz_mm).all(axis=2))
+
+    def samples(self, marker_id: int) -> Samples:
+        """The displacement of one marker from its mean position, at its own times, mm."""
+        m = int(np.flatnonzero(self.ids == marker_id)[0])
+        good = self.seen[:, m]
+        xyz = self.xyz_mm[good, m]
+        values = xyz - xyz.mean(axis=0) if len(xyz) else xyz
+        return Samples(self.sample_t_s[good, m], values, "displacement", "mm", ("x", "y", "z"))
+
+    def to_dataframe(self) -> Any:
+        """One row a marker and time, markers by id: the columns of the CSV export (pandas)."""
+        import pandas as pd
+
+        order = np.argsort(self.ids)
+        n, m = self.t_s.size, self.ids.size
+        frame = {"time_s": self.sample_t_s[:, order].T.ravel()}
+        frame["marker"] = np.repeat(self.ids[order], n)
+        for k, axis in enumerate("xyz"):
+            frame[f"{axis}_mm"] = self.xyz_mm[:, order, k].T.ravel()
+        for k, axis in enumerate("xyz"):
+            frame[f"sigma_{axis}_mm"] = self.sigma_xyz_mm[:, order, k].T.ravel()
+        words = np.array([s.word for s in State])
+        frame["state"] = words[self.state[:, order].T.ravel()] if m else np.empty(0, "U1")
+        return pd.DataFrame(frame)

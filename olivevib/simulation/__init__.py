@@ -1,0 +1,1 @@
+"""Scenes with known truth, written as a technician would record them."""

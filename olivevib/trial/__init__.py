@@ -1,0 +1,1 @@
+"""The trial folder: what the technician knows, what each stage wrote, what is stale."""

@@ -1,0 +1,90 @@
+"""Spectra, spectral lines and what is known of their true frequency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from olivevib.arrays import Floats, Ints, floats, ints
+
+
+class LineStatus(StrEnum):
+    """How far the frequency of a line is known; never print a frequency without it.
+
+    ``direct``: the sampling rate exceeds twice the declared band, no alias exists. ``confirmed``,
+    ``supported``: decided by sampling-time evidence. ``ambiguous``: candidates remain. ``blind``:
+    the motion looks like sway at this frame rate. ``chirp``: speed changes too fast. ``aliased``:
+    no usable stamps, row time or fit to decide. ``none``: no line stands out of the noise.
+    """
+
+    DIRECT = "direct"
+    CONFIRMED = "confirmed"
+    SUPPORTED = "supported"
+    AMBIGUOUS = "ambiguous"
+    BLIND = "blind"
+    CHIRP = "chirp"
+    ALIASED = "aliased"
+    NONE = "none"
+
+
+@dataclass(frozen=True)
+class Line:
+    """The dominant line of one marker: frequency, amplitudes (peak) and phases of its three axes.
+
+    f_hz is the frequency at which the line was fitted (NaN for status none); where the status is
+    ambiguous or aliased it is only the lowest of ``candidates_hz``. amplitude, sigma, phase_rad
+    (3,): peak, in ``unit``; x(t) = amplitude cos(2 pi f (t - t_ref_s) + phase).
+    harmonics: amplitudes (H, 3) at 2f, 3f, …; probabilities of the candidates or empty.
+    reasons: why this status, in words a technician understands.
+    """
+
+    f_hz: float
+    f_sigma_hz: float
+    status: LineStatus
+    candidates_hz: tuple[float, ...]
+    amplitude: Floats
+    amplitude_sigma: Floats
+    phase_rad: Floats
+    t_ref_s: float
+    unit: str
+    harmonics: Floats
+    probabilities: tuple[float, ...] = ()
+    reasons: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("amplitude", "amplitude_sigma", "phase_rad"):
+            object.__setattr__(self, name, floats(name, getattr(self, name), (3,), nan=True))
+        harmonics = floats("harmonics", self.harmonics, (None, 3), nan=True)
+        object.__setattr__(self, "harmonics", harmonics)
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """One-sided spectra of all markers on one frequency grid, with the dominant line of each.
+
+    f_hz (F,); ids (M,); amplitude (F, M, 3) peak in ``unit``; psd (F, M, 3) in unit²/Hz;
+    window name, resolution_hz (bin spacing), enbw_bins (equivalent noise bandwidth);
+    lines (M,): the dominant line of each marker, with its status.
+    """
+
+    f_hz: Floats
+    ids: Ints
+    amplitude: Floats
+    psd: Floats
+    quantity: str
+    unit: str
+    window: str
+    resolution_hz: float
+    enbw_bins: float
+    lines: tuple[Line, ...]
+
+    def __post_init__(self) -> None:
+        f_hz = floats("f_hz", self.f_hz, (None,))
+        ids = ints("ids", self.ids, (None,))
+        shape = (f_hz.size, ids.size, 3)
+        object.__setattr__(self, "f_hz", f_hz)
+        object.__setattr__(self, "ids", ids)
+        object.__setattr__(self, "amplitude", floats("amplitude", self.amplitude, shape, nan=True))
+        object.__setattr__(self, "psd", floats("psd", self.psd, shape, nan=True))
+        if len(self.lines) != ids.size:
+            raise ValueError(f"need one line a marker, got {len(self.lines)} for {ids.size}")
