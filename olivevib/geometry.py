@@ -242,3 +242,45 @@ def homography_jacobian(H: Floats, points: ArrayLike) -> Floats:
     image = w[:, :2] / w[:, 2:]
     out: Floats = (H[None, :2, :2] - image[:, :, None] * H[None, None, 2, :2]) / w[:, 2, None, None]
     return out
+
+
+def diagonal_crossing(corners: ArrayLike) -> Floats:
+    """The crossing (N, 2) of the diagonals of N quadrilaterals (N, 4, 2).
+
+    For the image of a square this is the image of its centre, which the mean of the corners is not.
+    """
+    p1, p2, p3, p4 = np.moveaxis(np.asarray(corners, dtype=np.float64), -2, 0)
+    d, e = p3 - p1, p4 - p2
+    along = _cross(p2 - p1, e) / _cross(d, e)
+    out: Floats = p1 + along[..., None] * d
+    return out
+
+
+def diagonal_crossing_jacobian(corners: ArrayLike) -> Floats:
+    """Derivative (N, 2, 8) of diagonal_crossing by the corners x1 y1 … x4 y4.
+
+    A corner displaced along the other diagonal's normal moves the crossing in proportion to the
+    crossing's distance from the opposite end; exact to first order.
+    """
+    c = np.asarray(corners, dtype=np.float64)
+    p1, p2, p3, p4 = np.moveaxis(c, -2, 0)
+    d, e = p3 - p1, p4 - p2
+    w = _cross(d, e)
+    s = _cross(p2 - p1, e) / w  # crossing = p1 + s d = p2 + r e
+    r = _cross(p2 - p1, d) / w
+    n_d = np.stack([-d[..., 1], d[..., 0]], -1)  # n_d . v = cross(d, v)
+    n_e = np.stack([-e[..., 1], e[..., 0]], -1)
+    on_d = -e / w[..., None]  # moving line d by one normal unit moves the crossing along e
+    on_e = d / w[..., None]
+    parts = [
+        -(1 - s)[..., None, None] * on_d[..., :, None] * n_d[..., None, :],
+        -(1 - r)[..., None, None] * on_e[..., :, None] * n_e[..., None, :],
+        -s[..., None, None] * on_d[..., :, None] * n_d[..., None, :],
+        -r[..., None, None] * on_e[..., :, None] * n_e[..., None, :],
+    ]
+    return np.concatenate(parts, axis=-1)
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    out: Floats = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return out

@@ -1,10 +1,23 @@
-"""Frames of one camera to tracks: location rectangles, re-initialisation, states."""
+"""Frames of one camera to tracks: location rectangles, re-initialisation, states.
+
+Source: paper, section 3.3.
+"""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from olivevib.arrays import Floats, Ints, floats, ints
+import numpy as np
+
+from olivevib.arrays import Floats, Grey, Ints, floats, ints
+from olivevib.detection import Detection, DetectionSettings, Detector
+from olivevib.marker import MarkerLibrary
+from olivevib.signals import StampFit, State
+
+LOST_AFTER_S = 1.0  # a marker unseen for longer is lost, not merely hidden
+QUIET_SHARE = 0.25  # of the marker's box: kept around it so that its border can be read
 
 
 @dataclass(frozen=True)
@@ -47,3 +60,199 @@ class Track:
         }
         for name, shape in shapes.items():
             object.__setattr__(self, name, floats(name, getattr(self, name), shape, nan=True))
+
+    @property
+    def seen(self) -> int:
+        """In how many frames the marker was seen."""
+        return int(np.isfinite(self.centre_px[:, 0]).sum())
+
+
+class Tracker:
+    """Follows the markers of one camera from frame to frame; not to be shared between threads.
+
+    Each marker is searched in its location rectangle, the box of its last corners enlarged by
+    Δscale. When fewer than Δmarker are found, the whole frame is scanned (re-initialisation).
+    What it found depends on the frames alone and on ``memory()``, which ``recall`` restores.
+    """
+
+    def __init__(self, library: MarkerLibrary, settings: DetectionSettings | None = None) -> None:
+        self.settings = settings or DetectionSettings()
+        self._detector = Detector(library, self.settings)
+        self._last: dict[int, Floats] = {}
+        self._expected = self.settings.marker
+
+    def update(self, grey: Grey, t_s: float) -> list[Detection]:
+        """All markers of the next frame, sorted by id; t_s is its time, later than the last."""
+        found = self._search(grey) if self._last else {}
+        if len(found) < max(1, self._expected):
+            found |= {d.id: d for d in self._detector.detect(grey)}
+        self._last = {i: d.corners_px for i, d in found.items()}
+        if not self.settings.marker:
+            self._expected = max(self._expected, len(found))
+        return [found[i] for i in sorted(found)]
+
+    def memory(self) -> bytes:
+        """What the tracker carries from frame to frame, to go on later as if never stopped."""
+        last = {str(i): [v.hex() for v in c.ravel().tolist()] for i, c in self._last.items()}
+        return json.dumps({"last": last, "expected": self._expected}).encode()
+
+    def recall(self, memory: bytes) -> None:
+        """Go on from a ``memory()``."""
+        stored = json.loads(memory)
+        self._expected = int(stored["expected"])
+        self._last = {
+            int(i): np.array([float.fromhex(v) for v in c]).reshape(4, 2)
+            for i, c in stored["last"].items()
+        }
+
+    def _search(self, grey: Grey) -> dict[int, Detection]:
+        height, width = grey.shape
+        boxes = _merged([_rectangle(c, self.settings.scale) for c in self._last.values()])
+        found: dict[int, Detection] = {}
+        for x0, y0, x1, y1 in boxes:
+            left, top = max(0, int(x0)), max(0, int(y0))
+            right, bottom = min(width, int(np.ceil(x1))), min(height, int(np.ceil(y1)))
+            if right - left >= 16 and bottom - top >= 16:
+                window = np.ascontiguousarray(grey[top:bottom, left:right])
+                for detection in self._detector.detect(window):
+                    found[detection.id] = _shifted(detection, left, top)
+        return found
+
+
+def _rectangle(corners: Floats, scale: float) -> tuple[float, float, float, float]:
+    """The location rectangle: bounding box of the corners about its centre, enlarged."""
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    middle, half = (low + high) / 2, (high - low).max() / 2 * (scale + QUIET_SHARE)
+    return (middle[0] - half, middle[1] - half, middle[0] + half, middle[1] + half)
+
+
+def _merged(
+    boxes: Sequence[tuple[float, float, float, float]],
+) -> list[tuple[float, float, float, float]]:
+    """Overlapping boxes joined until none overlap, so that no marker is read twice."""
+    left = sorted(boxes)
+    done: list[tuple[float, float, float, float]] = []
+    while left:
+        a = left.pop(0)
+        k = next((k for k, b in enumerate(left) if _overlap(a, b)), None)
+        if k is None:
+            done.append(a)
+        else:
+            b = left.pop(k)
+            left.insert(0, (min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])))
+    joined = any(_overlap(a, b) for n, a in enumerate(done) for b in done[n + 1 :])
+    return _merged(done) if joined else done
+
+
+def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def _shifted(d: Detection, x: int, y: int) -> Detection:
+    """The detection of a window in the coordinates of the whole image."""
+    return Detection(
+        id=d.id,
+        corners_px=d.corners_px + np.array([x, y]),
+        corners_cov_px2=d.corners_cov_px2,
+        centre_px=d.centre_px + np.array([x, y]),
+        centre_cov_px2=d.centre_cov_px2,
+        raw_row=d.raw_row + y,
+        localiser=d.localiser,
+        bit_errors=d.bit_errors,
+        flags=d.flags,
+    )
+
+
+@dataclass(frozen=True)
+class FrameTimes:
+    """When each delivered frame of one camera was taken, and its size.
+
+    fit: the clock fit of the stamps of all frames; start_s: trial time of row 0 of count 0 on this
+    camera's own clock; row_time_s signed, per raw row; damaged: indices that would not decode.
+    """
+
+    fit: StampFit
+    start_s: float
+    row_time_s: float
+    exposure_s: float
+    size_px: tuple[int, int]
+    damaged: frozenset[int] = frozenset()
+
+
+def assemble(
+    camera: str, frames: Sequence[Sequence[Detection]], times: FrameTimes, ids: Sequence[int]
+) -> list[Track]:
+    """Tracks of the wanted ids from the detections of each delivered frame.
+
+    frames: one list a delivered frame, in order. A count that the camera skipped is a row with
+    state dropped; a frame that would not decode is damaged; where a marker is missing it is
+    outside (it left at the border), hidden, or after LOST_AFTER_S lost.
+    """
+    sequence = times.fit.sequence
+    rows = int(sequence[-1]) + 1
+    frame_t_s = np.interp(np.arange(rows), sequence, times.fit.t_s - times.fit.t_s[0])
+    base = np.full(rows, int(State.DROPPED), np.int64)
+    base[sequence] = int(State.LOST)
+    base[sequence[sorted(times.damaged)]] = int(State.DAMAGED)
+    by_id: dict[int, dict[int, Detection]] = {i: {} for i in ids}
+    for row, detections in zip(sequence.tolist(), frames, strict=True):
+        for d in detections:
+            if d.id in by_id:
+                by_id[d.id][row] = d
+    return [
+        _track(camera, i, by_id[i], frame_t_s + times.start_s, base, times) for i in sorted(by_id)
+    ]
+
+
+def _track(
+    camera: str,
+    marker: int,
+    found: Mapping[int, Detection],
+    frame_t_s: Floats,
+    base: Ints,
+    times: FrameTimes,
+) -> Track:
+    n = frame_t_s.size
+    raw_row, centre = np.full(n, np.nan), np.full((n, 2), np.nan)
+    corners, corners_cov = np.full((n, 4, 2), np.nan), np.full((n, 8, 8), np.nan)
+    centre_cov = np.full((n, 2, 2), np.nan)
+    state = base.copy()
+    for row, d in found.items():
+        raw_row[row], centre[row], corners[row] = d.raw_row[0], d.centre_px, d.corners_px
+        centre_cov[row], corners_cov[row] = d.centre_cov_px2, d.corners_cov_px2
+        state[row] = State.FLAGGED if d.flags else State.SEEN
+    _explain_gaps(state, corners, frame_t_s, times.size_px)
+    row_or_middle = np.where(np.isfinite(raw_row), raw_row, times.size_px[1] / 2)
+    return Track(
+        camera=camera,
+        id=marker,
+        frame=np.arange(n),
+        t_s=frame_t_s + times.row_time_s * row_or_middle,
+        raw_row=raw_row,
+        corners_px=corners,
+        corners_cov_px2=corners_cov,
+        centre_px=centre,
+        centre_cov_px2=centre_cov,
+        exposure_s=np.full(n, times.exposure_s),
+        state=state,
+        localiser=next(iter(found.values())).localiser if found else "",
+    )
+
+
+def _explain_gaps(state: Ints, corners: Floats, t_s: Floats, size_px: tuple[int, int]) -> None:
+    """Turn lost into outside or hidden by where the marker was before and after the gap."""
+    seen = np.flatnonzero((state == State.SEEN) | (state == State.FLAGGED))
+    border = np.zeros(state.size, dtype=np.bool_)
+    for k in seen:
+        low, high = corners[k].min(axis=0), corners[k].max(axis=0)
+        margin = 0.5 * (high - low).max()
+        border[k] = bool(
+            (low < margin).any() or (high > np.array(size_px, dtype=np.float64) - 1 - margin).any()
+        )
+    for k in np.flatnonzero(state == State.LOST):
+        before, after = seen[seen < k], seen[seen > k]
+        near = [int(s[e]) for s, e in ((before, -1), (after, 0)) if s.size]
+        if any(border[j] for j in near):
+            state[k] = State.OUTSIDE
+        elif len(near) == 2 and t_s[near[1]] - t_s[near[0]] <= LOST_AFTER_S:
+            state[k] = State.HIDDEN

@@ -1,0 +1,40 @@
+"""The door of the room: one Detector for every library."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from olivevib.arrays import Grey
+from olivevib.detection.detection import Detection, Reader
+from olivevib.detection.foreign import ForeignReader
+from olivevib.detection.settings import DetectionSettings
+from olivevib.marker import MarkerLibrary
+
+
+class Detector:
+    """Finds the markers of one library in grey images; not to be shared between threads.
+
+    library: the paper's layout ("olive"), or a foreign family read through OpenCV.
+    settings: the paper's parameters, and ``mode``; foreign families know no parameters.
+    """
+
+    def __init__(self, library: MarkerLibrary, settings: DetectionSettings | None = None) -> None:
+        self.library = library
+        self.settings = settings or DetectionSettings()
+        self._reader = _READERS[library.family](library, self.settings)
+
+    def detect(self, grey: Grey) -> list[Detection]:
+        """All markers in ``grey`` (H, W) uint8, sorted by id; ValueError for other arrays."""
+        if grey.ndim != 2 or grey.dtype != "uint8":
+            raise ValueError(f"need a grey image (H, W) uint8, got {grey.shape} {grey.dtype}")
+        return self._reader.detect(grey)
+
+
+def _foreign(library: MarkerLibrary, settings: DetectionSettings) -> Reader:
+    return ForeignReader(library)
+
+
+_READERS: dict[str, Callable[[MarkerLibrary, DetectionSettings], Reader]] = {
+    "aruco": _foreign,
+    "apriltag": _foreign,
+}
