@@ -1,8 +1,8 @@
-"""Coded planar markers: the layout of location bars and code area, and libraries of codes."""
+"""What a coded planar marker is: the layout of location bars and code area, and a library."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ class MarkerLayout:
 
     Module coordinates count centres from 1, x right, y down, as printed (paper, section 3).
     The marker's size in mm is the outer side of its dark square: all ``modules`` modules.
+    Bars as long as the marker close to the dark frame of ArUco and AprilTag markers.
     """
 
     modules: int = 11
@@ -23,17 +24,28 @@ class MarkerLayout:
     quiet: int = 2  # white modules around the marker
 
     def __post_init__(self) -> None:
-        if not (0 < self.code <= self.modules - 4 and (self.modules - self.code) % 2 == 0):
+        ring = 2 if self.framed else 4  # a bar stands one white module off the code area
+        if not (0 < self.code <= self.modules - ring and (self.modules - self.code) % 2 == 0):
             raise ValueError(f"a code area of {self.code} does not fit {self.modules} modules")
-        if not (0 < self.bar <= self.modules - 4 and (self.modules - self.bar) % 2 == 0):
+        if not (
+            self.framed or (0 < self.bar <= self.modules - 4 and (self.modules - self.bar) % 2 == 0)
+        ):
             raise ValueError(f"a bar of {self.bar} does not fit {self.modules} modules")
         if self.quiet < 1:
             raise ValueError(f"the quiet zone must be at least one module, got {self.quiet}")
 
     @property
+    def framed(self) -> bool:
+        """Whether the four bars close to one dark frame, as in foreign families."""
+        return self.bar == self.modules
+
+    @property
     def cornerstones(self) -> Floats:
-        """P1…P4, clockwise as printed from upper left, as centred module coordinates (4, 2)."""
-        a = (self.modules - 1) / 2
+        """P1…P4, clockwise as printed from upper left, as centred module coordinates (4, 2).
+
+        The crossings of the bars' axes; of a framed layout the outer corners of the dark square.
+        """
+        a = self.modules / 2 if self.framed else (self.modules - 1) / 2
         return np.array([[-a, -a], [a, -a], [a, a], [-a, a]])
 
     def pattern(self, code: Bools) -> Bools:
@@ -51,7 +63,8 @@ class MarkerLayout:
 class MarkerLibrary:
     """Marker ids with their codes; ``family`` says which detector reads them.
 
-    ids (M,); codes (M, c, c) True where dark; distance: smallest Hamming distance over rotations.
+    ids (M,); codes (M, c, c) True where dark; distance: smallest Hamming distance over rotations,
+    also to mirror images where ``mirrors`` is set (only then can a mirrored video be told).
     ``family`` is "olive" for the paper's layout, "aruco" or "apriltag" for foreign families, whose
     codes stay with OpenCV (codes is then (M, 0, 0) and ``dictionary`` names them).
     """
@@ -63,6 +76,7 @@ class MarkerLibrary:
     distance: int
     family: str = "olive"
     dictionary: str = ""
+    mirrors: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ids", ints("ids", self.ids, (None,)))
@@ -75,12 +89,9 @@ class MarkerLibrary:
         """The same library with the ids ``wanted`` alone; raises KeyError for an unknown id."""
         at = {int(i): k for k, i in enumerate(self.ids)}
         pick = np.array([at[i] for i in wanted], dtype=np.int64)
-        return MarkerLibrary(
-            self.name,
-            self.ids[pick],
-            self.codes[pick],
-            self.layout,
-            self.distance,
-            self.family,
-            self.dictionary,
-        )
+        return replace(self, ids=self.ids[pick], codes=self.codes[pick])
+
+    def code(self, wanted: int) -> Bools:
+        """The code (c, c) of one id, True where dark; raises KeyError for an unknown id."""
+        found: Bools = self.only((wanted,)).codes[0]
+        return found
