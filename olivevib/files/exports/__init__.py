@@ -1,0 +1,6 @@
+"""Exports: a trajectory as files that spreadsheets, CAD, MATLAB and modal software open."""
+
+from olivevib.files.exports.door import FORMATS, export
+from olivevib.files.exports.facts import ExportFacts
+
+__all__ = ["FORMATS", "ExportFacts", "export"]
