@@ -12,7 +12,7 @@ from olivevib.geometry import (
     skew,
     vector_from_rotation,
 )
-from olivevib.reconstruction.triangulation import _inverse, linear_eigen
+from olivevib.reconstruction.triangulation import inverse_each, linear_eigen
 
 STEPS = 5
 
@@ -38,10 +38,10 @@ def rotations(
         return vectors, sigmas
     R, t = _rigid(corners_mm, points[good])
     pixels = [left[0][good], right[0][good]]
-    weights = [_inverse(left[1][good]), _inverse(right[1][good])]
+    weights = [inverse_each(left[1][good]), inverse_each(right[1][good])]
     for step in range(STEPS + 1):
         A, b = _normal(rig, corners_mm, R, t, pixels, weights)
-        covariance = _inverse(A)
+        covariance = inverse_each(A)
         if step < STEPS:
             move = np.einsum("nij,nj->ni", covariance, b)
             R = rotation_from_vector(move[:, :3]) @ R

@@ -63,7 +63,7 @@ def triangulate(
     the covariance is that of the images alone (the rig's own is reported apart).
     """
     xyz = linear_eigen(rig, left_px, right_px)
-    weights = [_inverse(left_cov), _inverse(right_cov)]
+    weights = [inverse_each(left_cov), inverse_each(right_cov)]
     for _ in range(STEPS):
         residuals, jacobians = _residuals(rig, xyz, left_px, right_px)
         A, b = _normal(residuals, jacobians, weights)
@@ -75,7 +75,7 @@ def triangulate(
     sigma_px = np.sqrt(
         (np.trace(left_cov, axis1=1, axis2=2) + np.trace(right_cov, axis1=1, axis2=2)) / 2
     )
-    return Points(xyz, _inverse(A), z * sigma_px, z)
+    return Points(xyz, inverse_each(A), z * sigma_px, z)
 
 
 def _residuals(
@@ -96,16 +96,16 @@ def _normal(
     return np.asarray(A), np.asarray(b)
 
 
-def _inverse(matrices: Floats) -> Floats:
+def inverse_each(matrices: Floats) -> Floats:
     """Inverses (N, k, k); NaN where a matrix is not finite or singular."""
     out = np.full_like(matrices, np.nan)
-    good = np.isfinite(matrices).all(axis=(1, 2))
-    good[good] &= np.abs(np.linalg.det(matrices[good])) > 0
+    good = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
+    good = good[np.abs(np.linalg.det(matrices[good])) > 0]
     out[good] = np.linalg.inv(matrices[good])
     return out
 
 
 def _solve(A: Floats, b: Floats) -> Floats:
     """Solutions (N, k); NaN where the system is not finite."""
-    out: Floats = np.einsum("nij,nj->ni", _inverse(A), b)
+    out: Floats = np.einsum("nij,nj->ni", inverse_each(A), b)
     return out

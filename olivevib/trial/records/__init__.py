@@ -1,0 +1,1 @@
+"""How the types that pass between rooms stand in the HDF5 file of each stage."""

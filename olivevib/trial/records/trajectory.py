@@ -1,0 +1,93 @@
+"""trajectory.h5: the 3-D paths, each sample with sigma, state and its own time."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from olivevib.arrays import Floats
+from olivevib.files.store import StageFile, Variable
+from olivevib.reconstruction import Reconstruction, Trajectory, TrialClock
+from olivevib.signals import State
+from olivevib.trial.records.cautions import cautions_from, cautions_text
+from olivevib.trial.stages import BY_NAME, Fingerprint
+
+STAGE = BY_NAME["reconstruct"]
+WORDS = tuple(s.word for s in State)
+XYZ = "x right, y down, z forward"
+
+
+def trajectory_file(result: Reconstruction, now: Fingerprint) -> StageFile:
+    """The stage file of a reconstruction."""
+    t = result.trajectory
+    nm = ("time", "marker")
+    axes = (*nm, "axis")
+    return StageFile(
+        stage=STAGE.name,
+        schema=STAGE.schema,
+        settings=dict(now.settings),
+        inputs=dict(now.inputs),
+        variables={
+            "time": Variable(("time",), t.t_s, "s", "trial clock at row 0 of the left frame"),
+            "marker": Variable(("marker",), t.ids, "1", "marker id"),
+            "sample_time": Variable(nm, t.sample_t_s, "s", "instant of the sample"),
+            "xyz": Variable(axes, t.xyz_mm, "mm", f"position of the centre, {XYZ}"),
+            "sigma_xyz": Variable(axes, t.sigma_xyz_mm, "mm", "standard deviation of xyz"),
+            "covariance": Variable((*axes, "axis2"), t.covariance_mm2, "mm2", "covariance of xyz"),
+            "rotation": Variable(axes, t.rotation_rad, "rad", "rotation vector, marker to camera"),
+            "sigma_rotation": Variable(
+                axes, t.sigma_rotation_rad, "rad", "standard deviation of rotation"
+            ),
+            "state": Variable(nm, t.state, "1", "why a sample is there or not", WORDS),
+            "epipolar": Variable(nm, t.epipolar_px, "px", "epipolar residual"),
+        },
+        attributes={
+            "frame": t.frame,
+            "method": t.method,
+            "clock": json.dumps(_clock(result.clock)),
+            "sigma_scale": result.sigma_scale,
+            "epipolar_rms_px": result.epipolar_rms_px,
+            "cautions": cautions_text(result.cautions),
+        },
+    )
+
+
+def _clock(clock: TrialClock) -> dict[str, float | str]:
+    return {
+        "right_offset_s": clock.right_offset_s,
+        "right_offset_sigma_s": clock.right_offset_sigma_s,
+        "reference_row": clock.reference_row,
+        "source": clock.source,
+        "left_row_time_s": clock.left_row_time_s,
+        "right_row_time_s": clock.right_row_time_s,
+    }
+
+
+def reconstruction_from(file: StageFile) -> Reconstruction:
+    """The reconstruction of a stage file."""
+
+    def get(name: str) -> Floats:
+        return np.asarray(file.variables[name].values)
+
+    trajectory = Trajectory(
+        t_s=get("time"),
+        ids=get("marker").astype(np.int64),
+        sample_t_s=get("sample_time"),
+        xyz_mm=get("xyz"),
+        sigma_xyz_mm=get("sigma_xyz"),
+        covariance_mm2=get("covariance"),
+        rotation_rad=get("rotation"),
+        sigma_rotation_rad=get("sigma_rotation"),
+        state=get("state").astype(np.int64),
+        epipolar_px=get("epipolar"),
+        frame=str(file.attributes["frame"]),
+        method=str(file.attributes["method"]),
+    )
+    return Reconstruction(
+        trajectory=trajectory,
+        clock=TrialClock(**json.loads(str(file.attributes["clock"]))),
+        sigma_scale=float(file.attributes["sigma_scale"]),
+        epipolar_rms_px=float(file.attributes["epipolar_rms_px"]),
+        cautions=cautions_from(file.attributes["cautions"]),
+    )
