@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from math import nan
 
 from olivevib.arrays import Floats, Ints, floats, ints
 
@@ -64,7 +65,8 @@ class Spectrum:
 
     f_hz (F,); ids (M,); amplitude (F, M, 3) peak in ``unit``; psd (F, M, 3) in unit²/Hz;
     window name, resolution_hz (bin spacing), enbw_bins (equivalent noise bandwidth);
-    lines (M,): the dominant line of each marker, with its status.
+    lines (M,): the dominant line of each marker, with its status. phase: the part of the trial,
+    from start_s to end_s. Velocity and acceleration are NaN where aliases may lie in the band.
     """
 
     f_hz: Floats
@@ -77,6 +79,9 @@ class Spectrum:
     resolution_hz: float
     enbw_bins: float
     lines: tuple[Line, ...]
+    phase: str = "whole"
+    start_s: float = nan
+    end_s: float = nan
 
     def __post_init__(self) -> None:
         f_hz = floats("f_hz", self.f_hz, (None,))

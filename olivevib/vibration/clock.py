@@ -1,0 +1,60 @@
+"""What the sample times of a record allow: its rate, whether it is even, how many places it has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from olivevib.arrays import Floats
+from olivevib.signals import Samples, fit_stamps
+
+EVEN = 1e-6  # of a period: nearer to an even clock than this, a record counts as even
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The even clock nearest to a record's times: rate, places (drops included), how even it is.
+
+    worst_periods: the largest distance of a sample from that clock, in periods.
+    """
+
+    rate_hz: float
+    places: int
+    samples: int
+    worst_periods: float
+
+    @property
+    def complete(self) -> bool:
+        """No place on the clock is empty."""
+        return self.places == self.samples
+
+    @property
+    def even(self) -> bool:
+        """Complete and exactly even: the FFT applies as it stands."""
+        return self.complete and self.worst_periods < EVEN
+
+    @property
+    def span_s(self) -> float:
+        """Length of the record as a spectrum counts it: places times the period, s."""
+        return self.places / self.rate_hz
+
+
+def clock_of(t_s: Floats) -> Clock:
+    """The clock of sample times t_s (N,), N >= 2."""
+    fit = fit_stamps(t_s)
+    return Clock(fit.rate_hz, int(fit.sequence[-1]) + 1, t_s.size, fit.worst_s * fit.rate_hz)
+
+
+def measured(samples: Samples) -> tuple[Floats, Floats]:
+    """Times (N,) and values (N, C) of the samples that were measured on every axis."""
+    good = np.isfinite(samples.values).all(axis=1)
+    return samples.t_s[good], samples.values[good]
+
+
+def between(samples: Samples, start_s: float, end_s: float) -> Samples:
+    """The samples with start_s <= t <= end_s."""
+    inside = (samples.t_s >= start_s) & (samples.t_s <= end_s)
+    return Samples(
+        samples.t_s[inside], samples.values[inside], samples.quantity, samples.unit, samples.axes
+    )
