@@ -1,0 +1,188 @@
+"""One camera: a start that finds no false minimum, then its lens from its own views.
+
+Source: Zhang, A flexible new technique for camera calibration, 2000 (poses from homographies).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from olivevib.arrays import Bools, Floats
+from olivevib.calibration.assemble import BoardShape, flatten
+from olivevib.calibration.bundle import LEFT, THETA, Observations, State, linearise
+from olivevib.calibration.solve import Prior, Problem, Solution, cost, grams, reduce, solve, step
+from olivevib.calibration.views import BoardView
+from olivevib.geometry import CameraModel, homography, nearest_rotation
+
+FOCAL_STARTS = (0.65, 0.5, 0.9, 1.3)  # of the image width; webcams lie between
+START_VIEWS = 15  # views used to choose among the starts
+LENS_FREE = np.arange(len(THETA)) < 6
+EFFICIENCY = 2 * (1 - np.exp(-2.0))  # E min(e^2, k^2) of a 2-D normal norm e at k = 2
+
+
+@dataclass(frozen=True)
+class LensPrior:
+    """Weak knowledge of a webcam's lens (knowledge: priors that were essential).
+
+    aspect_sd: beta/alpha = 1 +- this; centre_sd: of the width, about the image centre;
+    distortion_sd of k1, k2; bow_sd_mm at half the board's width; known: an earlier calibration of
+    this camera, whose covariance enters with its focal length widened by 0.5 %.
+    """
+
+    aspect_sd: float = 0.005
+    centre_sd: float = 0.02
+    distortion_sd: float = 0.5
+    bow_sd_mm: float = 1.0
+
+
+def lens_prior(prior: LensPrior, size_px: tuple[int, int], known: CameraModel | None) -> tuple[Floats, Floats]:
+    """Mean (6,) and precision (6, 6) of one lens before any image."""
+    width, height = size_px
+    mean = np.array([0.0, 0.0, (width - 1) / 2, (height - 1) / 2, 0.0, 0.0])
+    sd = np.array([prior.centre_sd * width] * 2 + [prior.distortion_sd] * 2)
+    precision = np.diag([0.0, 0.0, *(1 / sd**2)])
+    if known is None or known.covariance is None:
+        return mean, precision
+    covariance = known.covariance.copy()
+    widening = 0.005 * known.lens[:2]
+    covariance[:2, :2] += np.outer(widening, widening)
+    return known.lens, np.linalg.inv(covariance)
+
+
+def mono_prior(prior: LensPrior, size_px: tuple[int, int], known: CameraModel | None) -> Prior:
+    """The prior of a problem with one camera, which stands in the left camera's place."""
+    mean, precision = np.zeros(len(THETA)), np.zeros((len(THETA), len(THETA)))
+    mean[:6], precision[:6, :6] = lens_prior(prior, size_px, known)
+    precision[19:, 19:] = np.eye(3) / prior.bow_sd_mm**2
+    return Prior(mean, precision, prior.aspect_sd, aspect=(0,))
+
+
+@dataclass(frozen=True)
+class LensFit:
+    """One camera from its own views: solution, problem, and the scale of its claimed sigmas."""
+
+    solution: Solution
+    problem: Problem
+    scale: float
+
+    @property
+    def camera(self) -> CameraModel:
+        """The fitted camera."""
+        return self.solution.state.left
+
+
+def fit_lens(
+    views: Sequence[BoardView],
+    camera: CameraModel,
+    shape: BoardShape,
+    prior: Prior,
+) -> LensFit:
+    """Lens and board poses from one camera's views (at least 3), by robust least squares.
+
+    ``camera`` gives size and row time; its lens is only used where ``prior`` knows it already.
+    Several focal starts guard against false minima, both planar poses of every view are tried, and
+    the scale of the localiser's sigmas is estimated (Huber's proposal 2).
+    """
+    obs = flatten(views, LEFT, range(len(views)), shape)
+    unit = float(np.median(obs.sigma_px))
+    obs = replace(obs, sigma_px=obs.sigma_px / unit)  # 1 px to begin with
+    start = choose_start(views, camera, shape, prior)
+    state = posed(views, start, np.zeros(3))
+    scale = 1.0
+    free = LENS_FREE | (np.arange(len(THETA)) >= 19)
+    for _ in range(3):
+        problem = Problem(replace(obs, sigma_px=obs.sigma_px * scale), prior, free)
+        solution = solve(problem, state)
+        turned = better_poses(problem, solution.state)
+        if turned is not None:
+            solution = solve(problem, turned)
+        state = solution.state
+        scale *= scale_of(problem, solution)
+    return LensFit(solution, problem, scale / unit)
+
+
+def choose_start(
+    views: Sequence[BoardView], camera: CameraModel, shape: BoardShape, prior: Prior
+) -> CameraModel:
+    """The best of several focal lengths after a short fit of focal length, k1 and k2 alone."""
+    known = prior.precision[0, 0] > 0
+    pick = np.unique(np.linspace(0, len(views) - 1, min(START_VIEWS, len(views))).round().astype(int))
+    some = [views[k] for k in pick]
+    obs = flatten(some, LEFT, range(len(some)), shape)
+    obs = replace(obs, sigma_px=np.ones_like(obs.sigma_px))
+    free = np.zeros(len(THETA), dtype=np.bool_)
+    free[[0, 1, 4, 5]] = True
+    tied = Problem(obs, replace(prior, aspect_sd=1e-5), free)
+    best: tuple[float, CameraModel] | None = None
+    for factor in (None,) if known else FOCAL_STARTS:
+        focal = factor * camera.size_px[0] if factor else 0.0
+        lens = np.array([focal, focal, *prior.mean[2:4], 0.0, 0.0]) if factor else prior.mean[:6]
+        solution = solve(tied, posed(some, camera.with_lens(lens), np.zeros(3)), 40)
+        if best is None or solution.cost < best[0]:
+            best = (solution.cost, solution.state.left)
+    assert best is not None  # FOCAL_STARTS is not empty
+    return best[1]
+
+
+def posed(views: Sequence[BoardView], camera: CameraModel, bow: Floats) -> State:
+    """A state with each view's pose from the homography of its undistorted points."""
+    poses = [planar_pose(view.board_mm, camera.ray(view.px)) for view in views]
+    R, t = np.array([p[0] for p in poses]), np.array([p[1] for p in poses])
+    return State(camera, camera, np.eye(3), np.zeros(3), 0.0, bow, R, t)
+
+
+def planar_pose(board_mm: Floats, rays: Floats) -> tuple[Floats, Floats]:
+    """Rotation (3, 3) and translation (3,) of a flat board from viewing rays (N, 3), N >= 4."""
+    H = homography(board_mm[:, :2], rays[:, :2])
+    scale = 2 / (np.linalg.norm(H[:, 0]) + np.linalg.norm(H[:, 1]))
+    H = H * (scale if H[2] @ np.append(board_mm[:, :2].mean(axis=0), 1.0) > 0 else -scale)
+    R = nearest_rotation(np.column_stack([H[:, 0], H[:, 1], np.cross(H[:, 0], H[:, 1])]))
+    return R, H[:, 2]
+
+
+def better_poses(problem: Problem, state: State) -> State | None:
+    """The state with those views turned whose second planar pose fits better; None if none does."""
+    centre = np.append(problem.observations.centre_mm, 0.0)
+    middle = np.einsum("vij,j->vi", state.R_pose, centre) + state.t_pose_mm
+    d = middle / np.linalg.norm(middle, axis=1, keepdims=True)
+    mirror = np.eye(3) - 2 * d[:, :, None] * d[:, None, :]
+    R = mirror @ state.R_pose @ np.diag([1.0, 1.0, -1.0])
+    flipped = replace(state, R_pose=R, t_pose_mm=middle - np.einsum("vij,j->vi", R, centre))
+    alone = replace(problem, free=np.zeros(len(THETA), dtype=np.bool_))
+    other = solve(alone, flipped, 15)
+    now = view_costs(problem.observations, linearise(problem.observations, state).residual)
+    then = view_costs(problem.observations, other.residual)
+    swap = then < now - 1e-6
+    if not swap.any():
+        return None
+    pick = swap[:, None]
+    return replace(
+        state,
+        R_pose=np.where(pick[:, :, None], other.state.R_pose, state.R_pose),
+        t_pose_mm=np.where(pick, other.state.t_pose_mm, state.t_pose_mm),
+    )
+
+
+def view_costs(obs: Observations, residual: Floats, bound: float = 2.0) -> Floats:
+    """Robust cost of each board pose (V,)."""
+    norm = np.linalg.norm(residual, axis=1) / obs.sigma_px
+    each = np.where(norm <= bound, 0.5 * norm**2, bound * (norm - 0.5 * bound))
+    out: Floats = np.bincount(obs.pose, np.where(np.isfinite(each), each, np.inf), obs.poses)
+    return out
+
+
+def scale_of(problem: Problem, solution: Solution, at: Bools | None = None) -> float:
+    """By how much the claimed sigmas must grow for the residuals to be as large as they are."""
+    obs = problem.observations
+    keep = np.ones(obs.chain.size, dtype=np.bool_) if at is None else at
+    norm = np.linalg.norm(solution.residual[keep], axis=1) / obs.sigma_px[keep]
+    unknown = 6 * np.unique(obs.pose[keep]).size + int(problem.free.sum())
+    share = max(1 - unknown / (2 * norm.size), 0.05)
+    scale = float(np.median(norm)) + 1e-9
+    for _ in range(30):
+        clipped = np.minimum(norm / scale, problem.huber) ** 2
+        scale *= float(np.sqrt(clipped.sum() / (EFFICIENCY * share * norm.size)))
+    return scale
