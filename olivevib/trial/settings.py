@@ -1,4 +1,4 @@
-"""What ``trial.toml`` may say: the session record, the recordings, and the settings of each stage."""
+"""What ``trial.toml`` may say: the session record, the recordings, the settings of each stage."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ def tracks_file(stored: StoredTracks, now: Fingerprint) -> StageFile:
 
 
 def _side(side: str, tracks: tuple[Track, ...], stamp_s: Floats) -> dict[str, Variable]:
-    n, m = stamp_s.size, len(tracks)
+    n = stamp_s.size
 
     def stack(name: str, *rest: int) -> Floats:
         values = [getattr(t, name) for t in tracks]

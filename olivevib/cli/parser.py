@@ -1,0 +1,135 @@
+"""The verbs and their options; only argparse is loaded here, so that --help is instant."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from olivevib import __version__
+
+STAGE_VERBS = {
+    "calibrate": "both lenses and the pair from recordings of a board -> rig.toml",
+    "track": "every marker through both videos -> tracks.h5",
+    "reconstruct": "the 3-D paths with their sigma -> trajectory.h5",
+    "analyse": "displacement, velocity, acceleration, spectra -> vibration.h5",
+    "compare": "optical against accelerometer -> comparison.h5",
+}
+EXPORTS = ("csv", "txt", "h5", "dxf", "step", "iges", "ply", "uff", "c3d", "trc", "mat")
+EXAMPLES = """\
+a trial from two videos and two recordings of the calibration board:
+  olivevib new T04 --left left.mkv --right right.mkv --size 60 --ids 1-8 \\
+      --calibration-left board_left.mkv --calibration-right board_right.mkv \\
+      --board coded:5x5,pitch=60,size=44
+  olivevib run T04
+  olivevib show T04
+  olivevib report T04
+exit codes: 0 done, 1 failed, 2 wrong use, 3 done with quality warnings, 130 cancelled
+"""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The whole command line."""
+    parser = argparse.ArgumentParser(
+        prog="olivevib",
+        description="Measure the vibration of a shaken olive tree with two webcams.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"olivevib {__version__}")
+    parser.set_defaults(verb="home:app", quiet=False, debug=False)
+    verbs = parser.add_subparsers(title="verbs", metavar="VERB")
+    _prepare_verbs(verbs)
+    _stage_verbs(verbs)
+    _result_verbs(verbs)
+    _other_verbs(verbs)
+    return parser
+
+
+def _add(verbs: Any, name: str, function: str, help_: str, more: str = "") -> Any:
+    parser = verbs.add_parser(
+        name,
+        help=help_,
+        description=f"{help_[0].upper()}{help_[1:]}.",
+        epilog=more,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("-q", "--quiet", action="store_true", help="errors only on stderr")
+    parser.add_argument("--debug", action="store_true", help="show a traceback on errors")
+    parser.set_defaults(verb=function)
+    return parser
+
+
+def _prepare_verbs(verbs: Any) -> None:
+    init = _add(verbs, "init", "prepare:init", "make a workspace: trials/ reports/ markers/")
+    init.add_argument("dir", nargs="?", default=".", metavar="DIR")
+    new = _add(verbs, "new", "prepare:new", "make a trial from two recordings", _NEW_MORE)
+    new.add_argument("trial", metavar="TRIAL", help="a folder, or a name under trials/")
+    new.add_argument("--left", required=True, metavar="FILE", help="recording of the left camera")
+    new.add_argument("--right", required=True, metavar="FILE", help="recording of the right camera")
+    new.add_argument("--calibration-left", metavar="PATH", help="video or folder of stills")
+    new.add_argument("--calibration-right", metavar="PATH", help="video or folder of stills")
+    new.add_argument("--board", metavar="SPEC", help="the calibration board (see below)")
+    new.add_argument("--rig", metavar="FILE", help="rig.toml of an earlier calibration")
+    new.add_argument("--markers", metavar="LIB", default="olive49", help="marker library")
+    new.add_argument("--size", type=float, metavar="MM", help="outer side of the dark square")
+    new.add_argument("--ids", metavar="1,2,5-9", help="the markers on the tree (default: all)")
+    new.add_argument("--shutter", choices=("rolling", "global"), help="how the sensors read out")
+    new.add_argument("--row-time", metavar="US[,US]", help="microseconds per sensor row, signed")
+    new.add_argument("--band", metavar="5-45", help="where the shaker's frequency may lie, Hz")
+    new.add_argument("--left-stamps", metavar="FILE", help="time stamps, one a frame")
+    new.add_argument("--right-stamps", metavar="FILE", help="time stamps, one a frame")
+    new.add_argument("--accelerometer", metavar="FILE", help="what the logger wrote")
+    new.add_argument("--accelerometer-marker", type=int, metavar="ID", help="where it was fixed")
+    new.add_argument("--link", action="store_true", help="leave the recordings where they are")
+
+
+_NEW_MORE = """\
+boards (columns x rows, mm):
+  coded:5x5,pitch=60,size=44[,first=1]       charuco:4x5,square=54,marker=40.5,dict=DICT_4X4_1000
+  chessboard:9x6,square=25 (inner corners)   arucogrid:5x7,size=40,gap=10,dict=DICT_6X6_250
+  a charuco board may end with ,inverted (white on black) and ,legacy
+libraries: olive49 (the default), a library's TOML file, aruco:DICT_4X4_1000, apriltag:36h11
+"""
+
+
+def _stage_verbs(verbs: Any) -> None:
+    for name, help_ in STAGE_VERBS.items():
+        stage = _add(verbs, name, "stages:one", help_)
+        stage.add_argument("trials", nargs="+", metavar="TRIAL")
+        stage.add_argument("--paper", action="store_true", help="as the paper of 2011 does it")
+        _set_option(stage)
+        stage.set_defaults(stage=name)
+    run = _add(verbs, "run", "stages:run", "every stage that is missing or stale, in order")
+    run.add_argument("trials", nargs="+", metavar="TRIAL")
+    _set_option(run)
+
+
+def _set_option(parser: Any) -> None:
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a setting in trial.toml first, e.g. detection.fill=0.7",
+    )
+
+
+def _result_verbs(verbs: Any) -> None:
+    show = _add(verbs, "show", "results:show", "state and headline numbers of a trial")
+    show.add_argument("trial", metavar="TRIAL")
+    show.add_argument("--json", action="store_true", help="everything, for programs")
+    report = _add(verbs, "report", "results:report", "one self-contained page a trial")
+    report.add_argument("trials", nargs="+", metavar="TRIAL")
+    report.add_argument("-o", dest="output", metavar="DIR", help="where the pages go")
+    export = _add(verbs, "export", "results:export", "the 3-D paths for other programs")
+    export.add_argument("trial", metavar="TRIAL")
+    export.add_argument("--to", required=True, choices=EXPORTS, help="format")
+    export.add_argument("-o", dest="output", metavar="FILE", help="a file, or - for stdout")
+    export.add_argument("--markers", metavar="1,2", help="only these ids")
+    check = _add(verbs, "check", "results:check", "integrity of everything in a trial")
+    check.add_argument("trial", metavar="TRIAL")
+
+
+def _other_verbs(verbs: Any) -> None:
+    doctor = _add(verbs, "doctor", "home:doctor", "what works on this machine")
+    doctor.add_argument("--json", action="store_true", help="for programs")

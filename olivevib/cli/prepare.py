@@ -1,0 +1,54 @@
+"""Verbs before the measurement: init, new."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from olivevib.cli import values
+from olivevib.cli.console import Console
+
+
+def init(arguments: argparse.Namespace, console: Console) -> int:
+    """Make the folders of a workspace."""
+    from olivevib.trial.workspace import make_workspace
+
+    folder = Path(arguments.dir)
+    made = make_workspace(folder)
+    console.say(
+        f"{folder} is a workspace" + (f"; made {', '.join(p.name for p in made)}." if made else ".")
+    )
+    console.say("Next: olivevib new TRIAL --left FILE --right FILE …  (see olivevib new --help)")
+    return 0
+
+
+def new(arguments: argparse.Namespace, console: Console) -> int:
+    """Make a trial from two recordings."""
+    from olivevib import pipeline
+    from olivevib.trial.workspace import place_for_new
+
+    left_row, right_row = values.row_times(arguments.row_time)
+    plan = pipeline.NewTrial(
+        left=arguments.left,
+        right=arguments.right,
+        calibration_left=arguments.calibration_left,
+        calibration_right=arguments.calibration_right,
+        board=arguments.board,
+        rig=arguments.rig,
+        markers=arguments.markers,
+        size_mm=arguments.size,
+        ids=values.id_list(arguments.ids),
+        shutter=arguments.shutter,
+        row_time_us=(left_row, right_row),
+        band_hz=values.band(arguments.band),
+        left_stamps=arguments.left_stamps,
+        right_stamps=arguments.right_stamps,
+        accelerometer=arguments.accelerometer,
+        accelerometer_marker=arguments.accelerometer_marker,
+        link=arguments.link,
+    )
+    folder = place_for_new(arguments.trial, Path())
+    trial = pipeline.new_trial(folder, plan, console.tick)
+    console.say(f"made {trial.folder}; describe it in {trial.folder / 'trial.toml'}")
+    console.say(f"Next: olivevib run {arguments.trial}")
+    return 0

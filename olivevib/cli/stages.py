@@ -1,0 +1,65 @@
+"""Verbs of the measurement: calibrate, track, reconstruct, analyse, compare, run."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from olivevib.cli import values
+from olivevib.cli.console import Console
+
+if TYPE_CHECKING:
+    from olivevib.trial import Trial
+
+PAPER_KEYS = {
+    "calibrate": {"calibration.paper": True},
+    "track": {"detection.mode": "paper", "detection.paper_centre": True},
+    "reconstruct": {"reconstruction.paper": True},
+    "analyse": {},
+    "compare": {},
+}
+
+
+def one(arguments: argparse.Namespace, console: Console) -> int:
+    """Run one stage of each trial, whether or not it is up to date."""
+    from olivevib import pipeline
+
+    changes = values.settings(arguments.set)
+    if arguments.paper:
+        changes |= PAPER_KEYS[arguments.stage]
+    warned = 0
+    for name in arguments.trials:
+        trial = _open(name, changes, console)
+        console.say(f"{trial.name}: {arguments.stage}")
+        cautions = pipeline.run_stage(trial, arguments.stage, console.tick)
+        warned += console.cautions(cautions)
+    return 3 if warned else 0
+
+
+def run(arguments: argparse.Namespace, console: Console) -> int:
+    """Run every stage that is missing or stale, in order."""
+    from olivevib import pipeline
+
+    warned = 0
+    changes = values.settings(arguments.set)
+    for name in arguments.trials:
+        trial = _open(name, changes, console)
+        console.say(f"{trial.name}")
+        for outcome in pipeline.run(trial, console.tick):
+            console.say(f"  {outcome.stage}: {outcome.words}")
+            warned += console.cautions(outcome.cautions)
+        console.say(f"Next: olivevib show {name}   or   olivevib report {name}")
+    return 3 if warned else 0
+
+
+def _open(name: str, changes: dict[str, object], console: Console) -> Trial:
+    from olivevib.trial import Trial
+    from olivevib.trial.workspace import find_trial
+
+    trial = Trial.open(find_trial(name, Path()))
+    if changes:
+        trial = trial.changed(changes)
+        told = ", ".join(f"{key} = {value}" for key, value in changes.items())
+        console.say(f"{trial.name}: trial.toml now says {told}")
+    return trial

@@ -1,0 +1,68 @@
+"""Words of the command line to values: id lists, bands, settings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from olivevib.errors import UsageError
+
+
+def id_list(text: str | None) -> tuple[int, ...]:
+    """"1,2,5-9" to ids; empty for None. UsageError for anything else."""
+    ids: list[int] = []
+    for part in (text or "").split(","):
+        first, _, last = part.strip().partition("-")
+        if not part.strip():
+            continue
+        if not first.isdigit() or (last and not last.isdigit()):
+            raise UsageError(f"{text!r} is no list of ids.", "", "Write it as 1,2,5-9.")
+        ids.extend(range(int(first), int(last or first) + 1))
+    return tuple(dict.fromkeys(ids))
+
+
+def band(text: str | None) -> tuple[float, float] | None:
+    """"5-45" to (5.0, 45.0) Hz; None for None. UsageError for anything else."""
+    if text is None:
+        return None
+    low, _, high = text.partition("-")
+    try:
+        limits = float(low), float(high)
+    except ValueError:
+        limits = (0.0, 0.0)
+    if not 0 < limits[0] < limits[1]:
+        raise UsageError(f"--band {text!r} is no band.", "", "Write it as 5-45, in Hz.")
+    return limits
+
+
+def row_times(text: str | None) -> tuple[float | None, float | None]:
+    """"27.8" or "27.8,-27.8" to the row times of left and right, µs; UsageError otherwise."""
+    if text is None:
+        return None, None
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) not in (1, 2):
+        raise UsageError(
+            f"--row-time {text!r} is no row time.", "", "Write microseconds, one or two: 27.8,27.8"
+        )
+    return values[0], values[-1]
+
+
+def settings(pairs: list[str]) -> dict[str, Any]:
+    """KEY=VALUE words to dotted settings; values as TOML, else as text."""
+    import tomlkit
+    from tomlkit.exceptions import TOMLKitError
+
+    out: dict[str, Any] = {}
+    for pair in pairs:
+        key, equals, text = pair.partition("=")
+        if not equals or "." not in key:
+            raise UsageError(
+                f"--set {pair!r} is no setting.", "", "Write it as detection.fill=0.7"
+            )
+        try:
+            out[key.strip()] = tomlkit.parse(f"v = {text}")["v"]
+        except TOMLKitError:
+            out[key.strip()] = text.strip()
+    return out

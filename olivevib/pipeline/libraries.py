@@ -1,0 +1,45 @@
+"""The marker library that a trial names, and the corners of its markers in mm."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olivevib.arrays import Floats
+from olivevib.errors import UsageError
+from olivevib.marker import MarkerLibrary, load_library
+from olivevib.trial import Trial, TrialSettings
+from olivevib.trial.fingerprints import library_file
+
+
+def trial_library(trial: Trial) -> MarkerLibrary:
+    """The library of a trial, its declared ids alone where some are declared."""
+    markers = trial.settings.markers
+    file = library_file(trial.folder, markers.library)
+    library = load_library(str(file) if file else markers.library)
+    return only_known(library, markers.ids)
+
+
+def only_known(library: MarkerLibrary, ids: tuple[int, ...]) -> MarkerLibrary:
+    """The declared ids of a library; UsageError naming those it does not have."""
+    unknown = sorted(set(ids) - {int(i) for i in library.ids})
+    if unknown:
+        low, high = int(library.ids.min()), int(library.ids.max())
+        raise UsageError(
+            f"library {library.name} has no marker {', '.join(map(str, unknown))}.",
+            f"It holds {library.ids.size} ids between {low} and {high}.",
+            "Correct --ids (markers.ids in trial.toml), or name the library that was printed.",
+        )
+    return library.only(ids) if ids else library
+
+
+def corners_mm(library: MarkerLibrary, settings: TrialSettings, marker: int) -> Floats:
+    """The corners (4, 3) of one marker in its own frame, mm; UsageError without a size."""
+    size = settings.markers.size_of(marker)
+    if size is None:
+        raise UsageError(
+            f"the size of marker {marker} is not known.",
+            "Its outer side in mm gives the turn of its plane and a check of the scale.",
+            "State it with --size MM (markers.size_mm in trial.toml).",
+        )
+    flat = library.layout.cornerstones * (size / library.layout.modules)
+    return np.column_stack([flat, np.zeros(4)])

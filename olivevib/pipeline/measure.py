@@ -1,0 +1,123 @@
+"""Stages after tracking: reconstruct, analyse, compare."""
+
+from __future__ import annotations
+
+from olivevib.comparison import Comparison, compare as compare_records
+from olivevib.errors import Caution, InputError
+from olivevib.files.store import write_stage
+from olivevib.geometry import StereoRig
+from olivevib.pipeline.libraries import corners_mm, trial_library
+from olivevib.progress import Tick, silent
+from olivevib.reconstruction import TrialClock
+from olivevib.reconstruction import reconstruct as reconstruct_tracks
+from olivevib.trial import Trial
+from olivevib.trial.records.tracks import StoredTracks
+from olivevib.trial.records.trajectory import trajectory_file
+from olivevib.trial.records.vibration import vibration_file
+from olivevib.vibration import SamplingFacts, VibrationSettings
+from olivevib.vibration import analyse as analyse_motion
+
+SAME_CLOCK_S = 1e-4  # cameras whose offset is known better than this count as in known step
+
+
+def reconstruct(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
+    """Triangulate the tracks on the trial clock and write trajectory.h5."""
+    now = trial.fingerprint("reconstruct")
+    tracks, rig = trial.tracks, trial.rig
+    if tracks is None:
+        raise trial.need("track")
+    if rig is None:
+        raise trial.need("calibrate")
+    _check_rig(rig, tracks)
+    library = trial_library(trial)
+    ids = {t.id for t in (*tracks.left, *tracks.right)}
+    if not ids:
+        raise InputError(
+            f"trial {trial.name} has no tracks.",
+            "No marker of the library was found in either video.",
+            "Check --markers and --ids (markers.library, markers.ids in trial.toml).",
+        )
+    corners = {i: corners_mm(library, trial.settings, i) for i in sorted(ids)}
+    clock = trial_clock(trial, tracks)
+    result = reconstruct_tracks(
+        tracks.left, tracks.right, rig, clock, corners, trial.settings.reconstruction, tick
+    )
+    write_stage(trial.folder / "trajectory.h5", trajectory_file(result, now))
+    return result.cautions
+
+
+def _check_rig(rig: StereoRig, tracks: StoredTracks) -> None:
+    """InputError where the rig was calibrated at another picture size."""
+    for side in ("left", "right"):
+        calibrated = getattr(rig, side).size_px
+        recorded = tracks.cameras[side].size_px
+        if tuple(calibrated) != tuple(recorded):
+            raise InputError(
+                f"the {side} video is {recorded[0]} x {recorded[1]} px, but rig.toml was "
+                f"calibrated at {calibrated[0]} x {calibrated[1]} px.",
+                "A calibration holds for one mode of the camera only.",
+                "Calibrate in the mode of the trial (olivevib calibrate), or name another rig.",
+            )
+
+
+def trial_clock(trial: Trial, tracks: StoredTracks) -> TrialClock:
+    """The offset between the cameras as far as it is known, and both row times.
+
+    A stated offset wins; else that of the calibration where board and trial are one recording (the
+    lag changes from recording to recording); else unknown, taken as zero.
+    """
+    rows = {side: tracks.cameras[side].row_time_s for side in ("left", "right")}
+    stated = trial.settings.reconstruction.right_offset_ms
+    both = {"left_row_time_s": rows["left"], "right_row_time_s": rows["right"]}
+    middle = tracks.cameras["left"].size_px[1] / 2
+    if stated is not None:
+        return TrialClock(stated * 1e-3, float("nan"), middle, "declared", **both)
+    calibration = trial.calibration
+    c, cameras = trial.settings.calibration, trial.settings.cameras
+    same = c.left == cameras.left.video and c.right == cameras.right.video
+    if same and calibration is not None and calibration.right_offset_sigma_s > 0:
+        return TrialClock(
+            calibration.right_offset_s,
+            calibration.right_offset_sigma_s,
+            calibration.reference_row,
+            "calibration",
+            **both,
+        )
+    return TrialClock(reference_row=middle, **both)
+
+
+def sampling_facts(trial: Trial, clock: TrialClock) -> SamplingFacts:
+    """What is known of the moments at which the markers were sampled."""
+    tracks = trial.tracks
+    if tracks is None:
+        raise trial.need("track")
+    left, right = tracks.cameras["left"], tracks.cameras["right"]
+    band = trial.settings.vibration.band_hz
+    known = left.row_time_source != "unknown" and right.row_time_source != "unknown"
+    exposure = trial.settings.cameras.left.exposure_ms
+    return SamplingFacts(
+        frame_rate_hz=left.rate_hz,
+        row_time_known=known,
+        right_offset_known=clock.source != "unknown",
+        stamps_true=False,
+        band_hz=band or SamplingFacts(left.rate_hz).band_hz,
+        band_declared=band is not None,
+        row_time_s=left.row_time_s if known else None,
+        right_offset_s=clock.right_offset_s if clock.source != "unknown" else None,
+        exposure_s=(exposure or 0.0) * 1e-3,
+    )
+
+
+def analyse(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
+    """Spectra, lines with their status and the figures of every marker; writes vibration.h5."""
+    now = trial.fingerprint("analyse")
+    reconstruction = trial.reconstruction
+    if reconstruction is None:
+        raise trial.need("reconstruct")
+    trajectory = reconstruction.trajectory
+    motion = {int(i): trajectory.samples(int(i)) for i in trajectory.ids}
+    settings = VibrationSettings(window=trial.settings.vibration.window)
+    facts = sampling_facts(trial, reconstruction.clock)
+    result = analyse_motion(motion, facts, settings, tick=tick)
+    write_stage(trial.folder / "vibration.h5", vibration_file(result, now))
+    return result.cautions

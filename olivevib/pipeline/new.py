@@ -1,0 +1,283 @@
+"""A new trial from recordings: everything is checked before anything is written."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import tomlkit
+from tomlkit.items import Table
+
+from olivevib.calibration.boards import parse_board
+from olivevib.errors import InputError, UsageError
+from olivevib.files.atomic import as_input_error
+from olivevib.files.stamps import pick_camera
+from olivevib.files.stills import IMAGE_SUFFIXES
+from olivevib.files.video import Video
+from olivevib.marker import load_library
+from olivevib.pipeline.libraries import only_known
+from olivevib.pipeline.recordings import SIDES, check_sizes
+from olivevib.progress import Tick, silent
+from olivevib.trial import Trial
+from olivevib.trial.document import FILE
+
+
+@dataclass(frozen=True)
+class NewTrial:
+    """What ``olivevib new`` was told; paths as the user gave them."""
+
+    left: str
+    right: str
+    calibration_left: str | None = None
+    calibration_right: str | None = None
+    board: str | None = None
+    rig: str | None = None
+    markers: str = "olive49"
+    size_mm: float | None = None
+    ids: tuple[int, ...] = ()
+    shutter: str | None = None
+    row_time_us: tuple[float | None, float | None] = (None, None)
+    band_hz: tuple[float, float] | None = None
+    left_stamps: str | None = None
+    right_stamps: str | None = None
+    accelerometer: str | None = None
+    accelerometer_marker: int | None = None
+    link: bool = False
+    simulated: bool = False
+
+
+def new_trial(folder: Path, plan: NewTrial, tick: Tick = silent) -> Trial:
+    """Make the trial folder with its recordings (copied, or named where they are with ``link``).
+
+    Raises InputError or UsageError before anything is written; the folder appears whole or not.
+    """
+    _check(plan)
+    part = folder.with_name(f".{folder.name}.part")
+    shutil.rmtree(part, ignore_errors=True)
+    try:
+        part.mkdir(parents=True)
+        places = _place(part, plan, tick)
+        (part / FILE).write_text(tomlkit.dumps(_document(plan, places)), encoding="utf-8")
+        if folder.exists():
+            _merge_into(part, folder)
+        else:
+            part.rename(folder)
+    except OSError as error:
+        raise as_input_error(error, folder) from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    return Trial.open(folder)
+
+
+def _merge_into(part: Path, folder: Path) -> None:
+    """Move into an existing folder without a trial, refusing to overwrite; trial.toml last."""
+    names = sorted(part.iterdir(), key=lambda p: p.name == FILE)
+    taken = [p.name for p in names if (folder / p.name).exists()]
+    if taken:
+        raise UsageError(
+            f"{folder} exists and holds {', '.join(taken)}.",
+            "A new trial never overwrites a file.",
+            "Choose another name.",
+        )
+    for path in names:
+        path.rename(folder / path.name)
+
+
+def _check(plan: NewTrial) -> None:
+    """Every fault of the plan that can be told before the work starts."""
+    pair = (plan.calibration_left, plan.calibration_right)
+    if any(pair) and not all(pair):
+        raise UsageError(
+            "only one side of the calibration was given.",
+            "",
+            "Give both --calibration-left and --calibration-right, or --rig FILE.",
+        )
+    if all(pair) and plan.rig:
+        raise UsageError(
+            "both board recordings and a rig were given.", "", "Give one of them, not both."
+        )
+    if all(pair) and not plan.board:
+        raise UsageError(
+            "the calibration board is not known.",
+            "",
+            "Name it with --board SPEC; olivevib new --help lists them.",
+        )
+    if plan.board:
+        parse_board(plan.board)
+    if plan.size_mm is not None and not plan.size_mm > 0:
+        raise UsageError(f"--size {plan.size_mm} is no size.", "", "Give millimetres above 0.")
+    only_known(load_library(plan.markers), plan.ids)
+    for path in _named(plan):
+        if not path.exists():
+            raise InputError(f"{path} is missing.", "", "Check the name and the folder.")
+    sizes = {side: _size(Path(getattr(plan, side))) for side in SIDES}
+    check_sizes(sizes)
+    for side in SIDES:
+        _check_calibration_size(plan, side, sizes[side])
+        stamps = getattr(plan, f"{side}_stamps")
+        if stamps:
+            pick_camera(stamps, Path(getattr(plan, side)).name)
+
+
+def _named(plan: NewTrial) -> Iterator[Path]:
+    names = [plan.left, plan.right, plan.calibration_left, plan.calibration_right]
+    names += [plan.rig, plan.accelerometer]
+    yield from (Path(name) for name in names if name)
+
+
+def _size(video: Path) -> tuple[int, int]:
+    with Video.open(video) as opened:
+        return opened.info.size_px
+
+
+def _check_calibration_size(plan: NewTrial, side: str, size: tuple[int, int]) -> None:
+    """InputError where a calibration video has another size than the trial's of that camera."""
+    calibration = getattr(plan, f"calibration_{side}")
+    if not calibration or not Path(calibration).is_file():
+        return
+    other = _size(Path(calibration))
+    if other != size:
+        raise InputError(
+            f"the {side} calibration is {other[0]} x {other[1]} px, the trial {size[0]} x {size[1]}.",
+            "A calibration holds for one mode of the camera only.",
+            "Record the board in the same mode as the trial, neither cropped, turned nor scaled.",
+        )
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where each recording is named in trial.toml."""
+
+    names: dict[str, str]
+
+    def get(self, path: str | None) -> str | None:
+        return self.names[path] if path else None
+
+
+def _place(part: Path, plan: NewTrial, tick: Tick) -> _Places:
+    """Copy the recordings into the trial, or name them where they are."""
+    wanted: dict[str, str] = {}  # source -> name in the trial
+    for side in SIDES:
+        source = getattr(plan, side)
+        wanted.setdefault(source, side + Path(source).suffix.lower())
+    for side in SIDES:
+        source = getattr(plan, f"calibration_{side}")
+        if source:
+            suffix = Path(source).suffix.lower() if Path(source).is_file() else ""
+            wanted.setdefault(source, f"calibration/{side}{suffix}")
+    if plan.calibration_left and plan.calibration_left == plan.calibration_right:
+        wanted[plan.calibration_left] = "calibration/stills"
+    for source in (plan.left_stamps, plan.right_stamps):
+        if source:
+            wanted.setdefault(source, Path(source).name)
+    if plan.accelerometer:
+        wanted.setdefault(plan.accelerometer, "accelerometer" + Path(plan.accelerometer).suffix)
+    if plan.rig:
+        wanted.setdefault(plan.rig, "shared_rig.toml")
+    if plan.markers.endswith(".toml"):
+        wanted.setdefault(plan.markers, Path(plan.markers).name)
+    for done, (source, name) in enumerate(wanted.items()):
+        tick(done, len(wanted), "copying recordings" if not plan.link else "checking recordings")
+        if plan.link:
+            wanted[source] = str(Path(source.split("#")[0]).resolve())
+        else:
+            _copy(Path(source.split("#")[0]), part / name.split("#")[0])
+    return _Places(wanted)
+
+
+def _copy(source: Path, target: Path) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if source.is_dir():
+        target.mkdir(exist_ok=True)
+        for still in sorted(source.iterdir()):
+            if still.suffix.lower() in IMAGE_SUFFIXES:
+                shutil.copyfile(still, target / still.name)
+    else:
+        shutil.copyfile(source, target)
+
+
+def _document(plan: NewTrial, places: _Places) -> tomlkit.TOMLDocument:
+    """trial.toml with comments that teach, and empty places for what only a person knows."""
+    doc = tomlkit.document()
+    doc.add(tomlkit.comment("An olivevib trial. Edit with any text editor; comments stay."))
+    doc["session"] = _table({"date": "", "place": "", "operator": "", "notes": ""})
+    if plan.simulated:
+        doc["session"]["simulated"] = True
+    doc["tree"] = _table({"id": "", "cultivar": "", "training": ""})
+    doc["tree"].add(tomlkit.comment("trunk_diameter_mm = 180   clamp_height_mm = 900"))
+    doc["machine"] = _table({"make": "", "type": ""})
+    doc["machine"].add(tomlkit.comment("set_frequency_hz = 25.0   shaking_time_s = 8.0"))
+    doc["markers"] = _markers(plan, places)
+    doc["cameras"] = _cameras(plan, places)
+    calibration = _calibration(plan, places)
+    if calibration:
+        doc["calibration"] = calibration
+    if plan.accelerometer:
+        sensor = {"file": places.get(plan.accelerometer), "marker": plan.accelerometer_marker}
+        doc["accelerometers"] = tomlkit.aot()
+        doc["accelerometers"].append(_table(sensor))
+    if plan.band_hz:
+        doc["vibration"] = _table({"band_hz": list(plan.band_hz)})
+    doc["outcome"] = _table({})
+    doc["outcome"].add(tomlkit.comment("removed_kg = 12.4   left_kg = 2.1   damage = 'none'"))
+    return doc
+
+
+def _markers(plan: NewTrial, places: _Places) -> Table:
+    library = places.get(plan.markers) if plan.markers.endswith(".toml") else plan.markers
+    table = _table({"library": library, "size_mm": plan.size_mm, "ids": list(plan.ids) or None})
+    table.add(tomlkit.comment("where each one sits, for the report:"))
+    table.add(tomlkit.comment("[[markers.marker]]"))
+    table.add(tomlkit.comment("id = 1"))
+    table.add(tomlkit.comment("place = 'trunk'   # trunk, branch, twig or fixed"))
+    return table
+
+
+def _cameras(plan: NewTrial, places: _Places) -> Table:
+    table = _table({"shutter": plan.shutter})
+    for side, row_time in zip(SIDES, plan.row_time_us, strict=True):
+        video = getattr(plan, side)
+        stamps = _stamps(plan, places, side)
+        table[side] = _table(
+            {"video": places.get(video), "stamps": stamps, "row_time_us": row_time}
+        )
+    return table
+
+
+def _stamps(plan: NewTrial, places: _Places, side: str) -> str | None:
+    """The stamp file with the camera in it, since the copied video has lost its own name."""
+    source = getattr(plan, f"{side}_stamps")
+    if not source:
+        return None
+    camera = pick_camera(source, Path(getattr(plan, side)).name)
+    name = str(places.get(source)).split("#")[0]
+    return name if camera is None else f"{name}#{camera}"
+
+
+def _calibration(plan: NewTrial, places: _Places) -> Table | None:
+    if plan.rig:
+        return _table({"rig": places.get(plan.rig)})
+    if not plan.calibration_left:
+        return None
+    same = {
+        side: getattr(plan, f"calibration_{side}") == getattr(plan, side) for side in SIDES
+    }
+    return _table(
+        {
+            "left": places.get(plan.calibration_left),
+            "right": places.get(plan.calibration_right),
+            "left_stamps": _stamps(plan, places, "left") if same["left"] else None,
+            "right_stamps": _stamps(plan, places, "right") if same["right"] else None,
+            "board": plan.board,
+        }
+    )
+
+
+def _table(values: dict[str, object]) -> Table:
+    table = tomlkit.table()
+    for key, value in values.items():
+        if value is not None:
+            table[key] = value
+    return table

@@ -1,0 +1,125 @@
+"""Stage ``track``: both videos to tracks, with a journal so that nothing acknowledged is lost."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from olivevib.files.journal import Journal
+from olivevib.files.store import write_stage
+
+from olivevib.detection import DetectionSettings
+from olivevib.errors import Caution
+from olivevib.files.video import Frame, Video, VideoInfo
+from olivevib.marker import MarkerLibrary
+from olivevib.pipeline.libraries import trial_library
+from olivevib.pipeline.observations import FrameObservations, pack, unpack
+from olivevib.pipeline.recordings import SIDES, check_sizes
+from olivevib.pipeline.tracks_result import stored_tracks
+from olivevib.pipeline.two_cameras import both
+from olivevib.progress import Tick, silent
+from olivevib.tracking import Tracker
+from olivevib.trial import Trial
+from olivevib.trial.fingerprints import PRIVATE
+from olivevib.trial.records.tracks import tracks_file
+
+COMMIT_ROWS = 16  # frames acknowledged together: at most this much work is repeated after a crash
+
+
+def track(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
+    """Track every marker of the trial through both videos and write tracks.h5.
+
+    Cancelling or killing it keeps every acknowledged frame; the next run resumes there and gives
+    bit-identical tracks. Raises InputError for unreadable videos, sizes or stamps.
+    """
+    now = trial.fingerprint("track")
+    library = trial_library(trial)
+    infos = {side: _info(trial, side) for side in SIDES}
+    check_sizes({side: infos[side].size_px for side in SIDES})
+    trial.private.mkdir(exist_ok=True)
+    key = hashlib.sha256(now.canonical().encode()).hexdigest()
+    journal = Journal.open(trial.folder / PRIVATE / "track.journal", key)
+    try:
+        _measure(trial, library, infos, journal, tick)
+        seen = {side: [unpack(row) for row in _payloads(journal, side)] for side in SIDES}
+    finally:
+        journal.close()
+    stored = stored_tracks(trial, library, infos, seen)
+    write_stage(trial.folder / "tracks.h5", tracks_file(stored, now))
+    journal.remove()
+    return stored.cautions
+
+
+@dataclass(frozen=True)
+class _Step:
+    """One measured frame, and what the tracker remembers after it."""
+
+    frame: int
+    payload: bytes
+    memory: bytes
+
+
+def _measure(
+    trial: Trial,
+    library: MarkerLibrary,
+    infos: dict[str, VideoInfo],
+    journal: Journal,
+    tick: Tick,
+) -> None:
+    """Bring the journal to the end of both videos."""
+    done, waiting = 0, 0
+    makers = {}
+    for side in SIDES:
+        last = journal.last(side)
+        start, memory = (0, None) if last is None else (last[0] + 1, last[1])
+        done += start
+        path = trial.path(getattr(trial.settings.cameras, side).video)
+        tracker = _tracker(library, trial.settings.detection, memory)
+        makers[side] = lambda path=path, start=start, tracker=tracker: _steps(path, start, tracker)
+
+    def collect(side: str, step: _Step) -> None:
+        nonlocal waiting
+        journal.append(side, step.frame, step.payload, step.memory)
+        waiting += 1
+        if waiting >= COMMIT_ROWS:
+            journal.commit()
+            waiting = 0
+
+    hints = [infos[side].frame_count_hint for side in SIDES]
+    total = sum(h for h in hints if h) if all(hints) else None
+    try:
+        both(makers, collect, tick, total, "tracking markers", done)
+    finally:
+        journal.commit()
+
+
+def _tracker(library: MarkerLibrary, settings: DetectionSettings, memory: bytes | None) -> Tracker:
+    tracker = Tracker(library, settings)
+    if memory is not None:
+        tracker.recall(memory)
+    return tracker
+
+
+def _steps(path: Path, start: int, tracker: Tracker) -> Iterator[_Step]:
+    with Video.open(path) as video:
+        for frame in video.frames(start):
+            yield _Step(frame.index, pack(_observe(frame, tracker)), tracker.memory())
+
+
+def _observe(frame: Frame, tracker: Tracker) -> FrameObservations:
+    if frame.grey is None:
+        return FrameObservations(frame.stamp_s, True, ())
+    found = tracker.update(frame.grey, frame.stamp_s)
+    return FrameObservations(frame.stamp_s, False, tuple(found))
+
+
+def _payloads(journal: Journal, side: str) -> Iterator[bytes]:
+    for row in journal.rows(side):
+        yield row.payload
+
+
+def _info(trial: Trial, side: str) -> VideoInfo:
+    with Video.open(trial.path(getattr(trial.settings.cameras, side).video)) as video:
+        return video.info

@@ -1,0 +1,116 @@
+"""A trial: what the technician knows, what was measured, and what is done, stale or missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from olivevib.errors import InputError
+from olivevib.files.rig_file import read_rig
+from olivevib.files.store import StageFile, read_stage
+from olivevib.geometry import StereoRig
+from olivevib.reconstruction import Reconstruction, Trajectory
+from olivevib.trial.document import change_settings, read_settings
+from olivevib.trial.fingerprints import PRIVATE, RIG, fingerprint, resolve
+from olivevib.trial.records.tracks import StoredTracks, tracks_from
+from olivevib.trial.records.trajectory import reconstruction_from
+from olivevib.trial.settings import TrialSettings
+from olivevib.trial.stages import BY_NAME, Fingerprint, Stage, StageState, stage_states
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial folder, opened. Results are read when asked for; None where a stage has not run.
+
+    A Trial is a snapshot of trial.toml; ``reopen()`` gives the folder as it is now.
+    """
+
+    folder: Path
+    settings: TrialSettings
+
+    @classmethod
+    def open(cls, folder: str | Path) -> Trial:
+        """Open a trial folder; InputError with every fault of its trial.toml."""
+        path = Path(folder)
+        return cls(path, read_settings(path))
+
+    def reopen(self) -> Trial:
+        """The same folder as it is on disk now."""
+        return Trial.open(self.folder)
+
+    def changed(self, changes: Mapping[str, Any]) -> Trial:
+        """The trial with dotted settings changed in its trial.toml, comments kept."""
+        return Trial(self.folder, change_settings(self.folder, changes))
+
+    @property
+    def name(self) -> str:
+        """The folder's name."""
+        return self.folder.resolve().name
+
+    def path(self, name: str) -> Path:
+        """A file named in trial.toml: absolute, or relative to the trial's folder."""
+        return resolve(self.folder, name)
+
+    @property
+    def private(self) -> Path:
+        """Where derived data stands that may be deleted at any time."""
+        return self.folder / PRIVATE
+
+    def fingerprint(self, stage: str | Stage) -> Fingerprint:
+        """What a stage depends on now; InputError where an input is missing."""
+        which = BY_NAME[stage] if isinstance(stage, str) else stage
+        return fingerprint(self.folder, self.settings, which)
+
+    def states(self) -> dict[str, StageState]:
+        """The state of every stage, in order, computed from files."""
+        return stage_states(self.folder, self.fingerprint, self._wanting())
+
+    def _wanting(self) -> dict[str, str]:
+        """Stages without an input to work on, and why."""
+        c, out = self.settings.calibration, {}
+        if not c.rig and not (c.left and c.right):
+            out["calibrate"] = "no board recordings and no rig file are named in trial.toml"
+        if not self.settings.accelerometers:
+            out["compare"] = "no accelerometer file is named in trial.toml"
+        elif all(a.marker is None for a in self.settings.accelerometers):
+            out["compare"] = "no accelerometer is bound to a marker (accelerometers.marker)"
+        return out
+
+    @cached_property
+    def rig(self) -> StereoRig | None:
+        """The calibrated pair of rig.toml."""
+        path = self.folder / RIG
+        return read_rig(path) if path.exists() else None
+
+    @cached_property
+    def tracks(self) -> StoredTracks | None:
+        """Both cameras' tracks with stamps and clock fits."""
+        file = self._stage_file("track")
+        return tracks_from(file) if file else None
+
+    @cached_property
+    def reconstruction(self) -> Reconstruction | None:
+        """The trajectory with its clock and sigma scale."""
+        file = self._stage_file("reconstruct")
+        return reconstruction_from(file) if file else None
+
+    @property
+    def trajectory(self) -> Trajectory | None:
+        """The 3-D paths of the markers."""
+        return self.reconstruction.trajectory if self.reconstruction else None
+
+    def _stage_file(self, name: str) -> StageFile | None:
+        stage = BY_NAME[name]
+        path = self.folder / stage.file
+        return read_stage(path, name) if path.exists() else None
+
+    def need(self, stage: str) -> InputError:
+        """The error for work that needs the result of a stage that has not run."""
+        return InputError(
+            f"trial {self.name} has no {BY_NAME[stage].file}.",
+            f"The stage {stage} has not run.",
+            f"Run: olivevib run {self.name}",
+        )

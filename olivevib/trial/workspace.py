@@ -1,0 +1,50 @@
+"""The folder with ``trials/``, ``reports/`` and ``markers/``, and how a trial is named in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from olivevib.errors import UsageError
+from olivevib.trial.document import FILE
+
+FOLDERS = ("trials", "reports", "markers")
+
+
+def make_workspace(folder: Path) -> list[Path]:
+    """Create the three folders where they are missing; returns those that were made."""
+    made = [folder / name for name in FOLDERS if not (folder / name).is_dir()]
+    for path in made:
+        path.mkdir(parents=True)
+    return made
+
+
+def find_trial(name: str, workspace: Path) -> Path:
+    """The folder of a trial: a path, or a name under ``trials/``; UsageError with near names."""
+    for candidate in (Path(name), workspace / "trials" / name):
+        if (candidate / FILE).is_file():
+            return candidate
+    known = ", ".join(t.name for t in list_trials(workspace)) or "none yet"
+    raise UsageError(
+        f"there is no trial {name!r}.",
+        f"Neither {name} nor trials/{name} holds a {FILE}; trials here: {known}.",
+        "Give a folder or a name, or make one: olivevib new TRIAL --left FILE --right FILE",
+    )
+
+
+def place_for_new(name: str, workspace: Path) -> Path:
+    """Where a new trial goes: a bare name under ``trials/`` of a workspace, else the path given."""
+    path = Path(name)
+    bare = len(path.parts) == 1 and not path.is_absolute()
+    folder = workspace / "trials" / name if bare and (workspace / "trials").is_dir() else path
+    if (folder / FILE).exists():
+        raise UsageError(
+            f"{folder} is a trial already.",
+            "A new trial never overwrites one.",
+            "Choose another name, or remove the folder yourself if it is not wanted.",
+        )
+    return folder
+
+
+def list_trials(workspace: Path) -> list[Path]:
+    """The trial folders of a workspace, sorted by name."""
+    return sorted(path.parent for path in (workspace / "trials").glob(f"*/{FILE}"))
