@@ -1,0 +1,7 @@
+"""Optical against accelerometer: clocks, axes, gain, coherence."""
+
+from olivevib.comparison.compare import compare
+from olivevib.comparison.settings import ComparisonSettings
+from olivevib.comparison.types import Comparison, LineDifference, Verdict
+
+__all__ = ["Comparison", "ComparisonSettings", "LineDifference", "Verdict", "compare"]

@@ -1,0 +1,296 @@
+"""Compare a marker's path with an accelerometer: clock, drift, axes, gain, verdict in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from olivevib.arrays import Floats
+from olivevib.comparison.fit import ClockFit, Seen, fit_clock
+from olivevib.comparison.forward import Nuisance, SensorMotion, nuisance, sensor_motion
+from olivevib.comparison.lag import CoarseLag, envelope_offset, fine_lag, offsets_that_overlap
+from olivevib.comparison.lines import line_differences, sensor_lines, sensor_part
+from olivevib.comparison.settings import ComparisonSettings
+from olivevib.comparison.types import Comparison, LineDifference, Verdict
+from olivevib.geometry import vector_from_rotation
+from olivevib.progress import Tick, silent
+from olivevib.signals import Samples
+from olivevib.vibration.clock import measured
+from olivevib.vibration.line import LineFit
+from olivevib.vibration.verdict import fold
+
+_FEWEST = 30
+_NARROWEST_HZ = 0.3
+_RESEMBLES = 0.8  # correlation below which the two motions are not called the same
+_CLOSE = 0.05  # a rival lag whose correlation comes that near is told
+_DECISIVE = 25.0  # chi-square by which the best lag must beat the rival to be sure
+_OPEN_DEG = 20.0
+
+
+def compare(
+    optical: Samples,
+    sensor: Samples,
+    marker: int,
+    sensor_name: str,
+    settings: ComparisonSettings = ComparisonSettings(),
+    tick: Tick = silent,
+) -> Comparison:
+    """Compare the displacement (mm, at mid-exposure) of a marker with a sensor (m/s2).
+
+    The sensor's acceleration predicts what the camera must have seen at each of its own instants,
+    so lines above half the frame rate compare as well; nothing is claimed about aliases of the
+    camera alone. clock_offset_s is the sensor's stamp minus the trial clock, at the middle of the
+    common record. Raises ValueError for other units.
+    """
+    if optical.unit != "mm" or len(optical.axes) != 3:
+        raise ValueError(f"marker {marker}: need three axes in mm, got {optical.unit}")
+    camera_s, camera_mm = measured(optical)
+    tick(0, 4, "displacement from the accelerometer")
+    motion = sensor_motion(sensor, settings.corner_hz)
+    empty = _Outcome.of(marker, sensor_name)
+    if camera_s.size < _FEWEST:
+        return empty.undecided(f"The marker was seen in {camera_s.size} frames only.")
+    limits = offsets_that_overlap(camera_s, motion, settings)
+    if limits is None:
+        return empty.no_overlap(camera_s, motion)
+    tick(1, 4, "lines of the accelerometer")
+    lines = sensor_lines(sensor, 1.5 * settings.corner_hz)
+    tick(2, 4, "lag between the clocks")
+    work = _Work(camera_s, camera_mm, motion, lines, settings)
+    lag = work.coarse(limits)
+    tick(3, 4, "clock, gain and rotation")
+    seen, clock = work.refined(lag.offset_s)
+    if seen.t_s.size < _FEWEST:
+        return empty.undecided("Too few frames lie inside the accelerometer's record.")
+    part = sensor_lines(sensor_part(sensor, seen.t_s, clock.offset_s), 1.5 * settings.corner_hz)
+    differences = line_differences(seen, motion, clock, part)
+    return _comparison(empty, work, lag, seen, clock, differences)
+
+
+@dataclass(frozen=True)
+class _Work:
+    camera_s: Floats
+    camera_mm: Floats
+    motion: SensorMotion
+    lines: LineFit
+    settings: ComparisonSettings
+
+    @property
+    def rate_hz(self) -> float:
+        return 1.0 / float(np.median(np.diff(self.camera_s)))
+
+    @property
+    def slow_hz(self) -> float:
+        """Width of the slow part: 1.5 corners, less where the line itself is seen that slow."""
+        wide = 1.5 * self.settings.corner_hz
+        if self.lines.fit is None:
+            return wide
+        seen = fold(float(self.lines.fit.f_hz[0]), self.rate_hz)
+        return min(wide, max(_NARROWEST_HZ, 0.6 * seen))
+
+    @property
+    def apart_s(self) -> float:
+        """How far a lag must lie from another to be a rival: a third of a period."""
+        return 0.02 if self.lines.fit is None else 0.35 / float(self.lines.fit.f_hz[0])
+
+    def coarse(self, limits: tuple[float, float]) -> CoarseLag:
+        """The best lag: envelopes where they are lively, else about the expected offset."""
+        s = self.settings
+        middle = envelope_offset(self.camera_s, self.camera_mm, self.motion, limits, self.slow_hz)
+        if middle is None:
+            middle = float(np.clip(s.expected_offset_s, *limits))
+        half = int(np.ceil(s.fine_half_s / s.fine_step_s))
+        offsets = middle + np.arange(-half, half + 1) * s.fine_step_s
+        slow = nuisance(self.camera_s, self.slow_hz)
+        return fine_lag(
+            self.camera_s,
+            slow.out(self.camera_mm),
+            self.motion,
+            slow,
+            offsets,
+            self.apart_s,
+            s.exposure_s,
+        )
+
+    def refined(self, offset_s: float) -> tuple[Seen, ClockFit]:
+        """Gauss-Newton from a coarse lag, on the frames that the sensor covers."""
+        margin = 2 * self.settings.fine_step_s
+        q = self.camera_s + offset_s
+        good = self.motion.usable(q, self.settings.exposure_s + margin)
+        t_s = self.camera_s[good]
+        slow = nuisance(t_s, self.slow_hz) if t_s.size > 1 else Nuisance(np.ones((t_s.size, 1)))
+        seen = Seen(t_s, slow.out(self.camera_mm[good]), slow, self.settings.exposure_s)
+        if t_s.size < _FEWEST:
+            return seen, _no_clock()
+        return seen, fit_clock(seen, self.motion, offset_s)
+
+
+def _no_clock() -> ClockFit:
+    none = np.full((0, 3), np.nan)
+    nan3 = np.full((3, 3), np.nan)
+    return ClockFit(
+        np.nan, np.nan, np.nan, nan3, np.full((6, 6), np.nan), none, none, nan3[0], np.nan
+    )
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """A comparison that says nothing yet."""
+
+    marker: int
+    sensor: str
+
+    @classmethod
+    def of(cls, marker: int, sensor: str) -> _Outcome:
+        return cls(marker, sensor)
+
+    def undecided(self, reason: str) -> Comparison:
+        return self.nothing(Verdict.UNDECIDED, reason)
+
+    def no_overlap(self, camera_s: Floats, motion: SensorMotion) -> Comparison:
+        reason = (
+            f"The accelerometer's usable part runs from {motion.start_s:.2f} to "
+            f"{motion.end_s:.2f} s of its own clock, the camera's from {camera_s[0]:.2f} to "
+            f"{camera_s[-1]:.2f} s: within the search there is no common half. Give the expected "
+            "offset between the clocks, or let both run through the whole trial."
+        )
+        return self.nothing(Verdict.NO_OVERLAP, reason)
+
+    def nothing(self, verdict: Verdict, reason: str) -> Comparison:
+        nan = float("nan")
+        return Comparison(
+            marker=self.marker,
+            sensor=self.sensor,
+            clock_offset_s=nan,
+            clock_offset_sigma_s=nan,
+            clock_drift_ppm=nan,
+            clock_drift_sigma_ppm=nan,
+            gain=nan,
+            gain_sigma=nan,
+            R_camera_sensor=np.full((3, 3), nan),
+            rotation_deg=nan,
+            rotation_sigma_deg=nan,
+            coherence=nan,
+            peak=nan,
+            second_peak=nan,
+            lines=(),
+            overlay_t_s=np.empty(0),
+            optical_mm=np.empty((0, 3)),
+            sensor_mm=np.empty((0, 3)),
+            verdict=verdict,
+            reason=reason,
+        )
+
+
+@dataclass(frozen=True)
+class _Rival:
+    """The best other lag: whether it is near enough to tell, and whether it is excluded."""
+
+    near: bool
+    excluded: bool
+    distance_s: float
+
+
+def _rival(work: _Work, lag: CoarseLag, clock: ClockFit) -> _Rival:
+    if not np.isfinite(lag.rival_s) or lag.peak - lag.second_peak >= _CLOSE:
+        return _Rival(False, True, 0.0)
+    _, other = work.refined(lag.rival_s)
+    noise = np.maximum(clock.noise_mm, 1e-12)
+    if not np.isfinite(other.gain):
+        return _Rival(True, False, abs(lag.rival_s - lag.offset_s))
+    worse = float(
+        np.sum((other.residual_mm / noise) ** 2) - np.sum((clock.residual_mm / noise) ** 2)
+    )
+    return _Rival(True, worse > _DECISIVE, abs(other.offset_s - clock.offset_s))
+
+
+def _comparison(
+    empty: _Outcome,
+    work: _Work,
+    lag: CoarseLag,
+    seen: Seen,
+    clock: ClockFit,
+    lines: tuple[LineDifference, ...],
+) -> Comparison:
+    rival = _rival(work, lag, clock)
+    sigma = clock.sigma
+    offset_sigma = float(np.hypot(sigma[0], 0.0 if rival.excluded else rival.distance_s))
+    worst_deg = float(np.degrees(clock.turn_sigma_rad))
+    angle = float(np.degrees(np.linalg.norm(vector_from_rotation(clock.R_camera_sensor))))
+    coherence = _coherence(seen.mm, clock.residual_mm)
+    verdict, reason = _verdict(work, lag, clock, coherence)
+    reasons = [reason, *_remarks(work, rival, clock, worst_deg)]
+    return Comparison(
+        marker=empty.marker,
+        sensor=empty.sensor,
+        clock_offset_s=clock.offset_s,
+        clock_offset_sigma_s=offset_sigma,
+        clock_drift_ppm=1e6 * clock.drift,
+        clock_drift_sigma_ppm=1e6 * float(sigma[1]),
+        gain=clock.gain,
+        gain_sigma=float(sigma[2]),
+        R_camera_sensor=clock.R_camera_sensor,
+        rotation_deg=angle if worst_deg < _OPEN_DEG else np.nan,
+        rotation_sigma_deg=worst_deg,
+        coherence=coherence,
+        peak=lag.peak,
+        second_peak=lag.second_peak,
+        lines=lines,
+        overlay_t_s=seen.t_s,
+        optical_mm=seen.mm,
+        sensor_mm=clock.predicted_mm,
+        verdict=verdict,
+        reason=" ".join(reasons),
+    )
+
+
+def _coherence(optical: Floats, residual: Floats) -> float:
+    total = float(np.sum(optical**2))
+    return float(np.clip(1 - np.sum(residual**2) / total, 0, 1)) if total > 0 else np.nan
+
+
+def _verdict(work: _Work, lag: CoarseLag, clock: ClockFit, coherence: float) -> tuple[Verdict, str]:
+    r = float(np.sqrt(coherence)) if np.isfinite(coherence) else 0.0
+    if r < _RESEMBLES:
+        if lag.peak - lag.second_peak < _CLOSE or r < 0.5:
+            return Verdict.UNDECIDED, (
+                f"No lag was found at which the two motions resemble one another (correlation "
+                f"{r:.2f}). Check that both belong to this trial and that the sensor sat at the "
+                "marker."
+            )
+        return Verdict.DIFFERS, (
+            f"At the best lag the two motions correlate by {r:.2f} only: the sensor and the "
+            "marker did not move as one body."
+        )
+    off, sigma = clock.gain - 1, float(clock.sigma[2])
+    size = f"{100 * off:+.2f} ± {100 * sigma:.2f} %"
+    if abs(off) <= max(work.settings.gain_tolerance, 3 * sigma):
+        if sigma > work.settings.gain_tolerance:
+            return Verdict.UNDECIDED, f"The gain is known to {100 * sigma:.0f} % only."
+        return Verdict.AGREES, f"Camera and accelerometer agree: gain {size}, correlation {r:.4f}."
+    return Verdict.DIFFERS, (
+        f"The camera's amplitude differs from the accelerometer's by {size} (correlation {r:.4f}): "
+        "check the sensor's scale, the marker's size and the calibration."
+    )
+
+
+def _remarks(work: _Work, rival: _Rival, clock: ClockFit, worst_deg: float) -> list[str]:
+    out = []
+    if rival.near and not rival.excluded:
+        out.append(
+            f"The lag is ambiguous: {1e3 * rival.distance_s:.1f} ms away the two fit as well "
+            "(a steady motion repeats itself). Let both record the start of the machine."
+        )
+    elif rival.near:
+        out.append(
+            f"A lag {1e3 * rival.distance_s:.1f} ms away fits almost as well, but is excluded by "
+            "the whole record."
+        )
+    if worst_deg >= _OPEN_DEG:
+        out.append("The motion is straight: the turn about it is left open.")
+    if work.motion.gaps.size:
+        out.append(f"{len(work.motion.gaps)} gaps in the accelerometer's record were left out.")
+    if work.motion.resampled:
+        out.append("The accelerometer's stamps are uneven; a spline carried it to an even grid.")
+    return out
