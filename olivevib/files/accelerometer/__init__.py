@@ -1,0 +1,6 @@
+"""Accelerometer files of any make, as acceleration in m/s2 on the sensor's own clock."""
+
+from olivevib.files.accelerometer.read import read_accelerometer
+from olivevib.files.accelerometer.record import AccelerometerRecord, Clock, Gap, ImportOptions
+
+__all__ = ["AccelerometerRecord", "Clock", "Gap", "ImportOptions", "read_accelerometer"]

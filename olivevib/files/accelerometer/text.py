@@ -1,0 +1,175 @@
+"""Delimited text of any make: sniffed, then read by pandas' C reader."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from olivevib.arrays import Floats
+from olivevib.errors import Caution, InputError
+from olivevib.files.accelerometer.encoding import find_encoding
+from olivevib.files.accelerometer.record import SEPARATORS, Channel, ImportOptions, Table
+from olivevib.files.accelerometer.sniff import SNIFF_BYTES, TextLayout, lines_of, sniff
+
+
+def read_text(data: bytes, options: ImportOptions, source: str) -> Table:
+    """Read delimited text; InputError where it holds no columns of numbers."""
+    layout = sniff_bytes(data, options, source)
+    return text_table(data, layout, source, "delimited text")
+
+
+def sniff_bytes(data: bytes, options: ImportOptions, source: str) -> TextLayout:
+    """The layout of the text in ``data``; InputError where there is none."""
+    head = data[:SNIFF_BYTES]
+    encoding = options.encoding or find_encoding(head)
+    if encoding is None:
+        raise InputError(
+            f"{source} is neither text nor a known recording.",
+            "It holds control bytes.",
+            "Export the recording from the logger's own software as CSV.",
+        )
+    lines = lines_of(_decoded(head, encoding, source), cut=len(data) > len(head))
+    separator = SEPARATORS[options.separator] if options.separator else None
+    layout = sniff(lines, encoding, separator=separator, decimal=options.decimal)
+    if layout is None or layout.first_row >= len(lines):
+        raise InputError(
+            f"{source} holds no columns of numbers.",
+            "No separator and decimal mark make a table of its lines."
+            if any(line.strip() for line in lines)
+            else "The file is empty.",
+            "Open it in an editor and see whether it is the recording; if so, name separator and "
+            "decimal mark.",
+        )
+    _refuse_ambiguous_commas(lines, layout, source)
+    return layout
+
+
+def _decoded(head: bytes, encoding: str, source: str) -> str:
+    try:
+        return head.decode(encoding, errors="replace")
+    except LookupError as error:
+        raise InputError(
+            f"{source}: the encoding {encoding} is unknown.", "", "Use utf-8, utf-16 or cp1252."
+        ) from error
+
+
+def _refuse_ambiguous_commas(lines: list[str], layout: TextLayout, source: str) -> None:
+    """Decimal comma and comma separator at once: twice as many cells as names."""
+    if layout.dialect.separator != "," or any(layout.names) or layout.first_row == 0:
+        return
+    names = [c for c in lines[layout.first_row - 1].split(",") if c.strip()]
+    if len(layout.kinds) in (2 * len(names), 2 * len(names) - 1) and len(names) > 1:
+        raise InputError(
+            f"{source} uses the comma both between columns and within numbers.",
+            f"The header has {len(names)} names, the rows have {len(layout.kinds)} cells.",
+            "Export it again with a semicolon or tab between the columns.",
+        )
+
+
+def text_table(data: bytes, layout: TextLayout, source: str, format: str) -> Table:
+    """The table of ``data`` under ``layout``."""
+    frame, skipped = _read_frame(data, layout, source)
+    channels = tuple(_channels(frame, layout))
+    cautions = []
+    if skipped:
+        cautions.append(
+            Caution(
+                "sensor-rows-skipped",
+                f"{skipped} rows of {source} have too many cells and were left out.",
+                "Look at these rows in an editor; the times of the others are unaffected.",
+            )
+        )
+    return Table(
+        format,
+        channels,
+        layout.metadata,
+        layout=layout.words(),
+        decimal=layout.dialect.decimal,
+        cautions=tuple(cautions),
+    )
+
+
+def _read_frame(data: bytes, layout: TextLayout, source: str) -> tuple[Any, int]:
+    """The data rows as a pandas frame, and the number of rows that were left out."""
+    import pandas as pd
+
+    dialect = layout.dialect
+    encoding = layout.encoding
+    if encoding.startswith(("utf-16", "utf-32")):
+        data, encoding = data.decode(encoding, errors="replace").encode("utf-8"), "utf-8"
+    if not data.endswith((b"\n", b"\r")):
+        data = _without_cut_row(data, layout)
+    try:
+        frame = pd.read_csv(
+            io.BytesIO(data),
+            sep=r"\s+" if dialect.separator == " " else dialect.separator,
+            decimal=dialect.decimal,
+            thousands=dialect.thousands or None,
+            header=None,
+            names=list(range(len(layout.kinds))),
+            index_col=False,
+            skiprows=layout.first_row,
+            comment=layout.comment or None,
+            encoding=encoding,
+            encoding_errors="replace",
+            on_bad_lines="skip",
+            skipinitialspace=True,
+            low_memory=False,
+            engine="c",
+        )
+    except (ValueError, pd.errors.ParserError, OverflowError, LookupError) as error:
+        raise InputError(
+            f"{source} cannot be read as {layout.words()}.",
+            str(error).splitlines()[0] if str(error) else "",
+            "Open it in an editor; name separator and decimal mark if the guess is wrong.",
+        ) from error
+    return frame, _skipped(data, layout, len(frame))
+
+
+def _skipped(data: bytes, layout: TextLayout, rows: int) -> int:
+    """How many lines of cells are missing from ``rows``; blank and comment lines do not count."""
+    if data.count(b"\n") - layout.first_row <= rows:
+        return 0
+    lines = data.split(b"\n")[layout.first_row :]
+    mark = layout.comment.encode() or b"\0"
+    return max(0, sum(1 for x in lines if x.strip() and not x.lstrip().startswith(mark)) - rows)
+
+
+def _without_cut_row(data: bytes, layout: TextLayout) -> bytes:
+    """Leave out a last line with too few cells: the recording was cut while it was written."""
+    at = max(data.rfind(b"\n"), data.rfind(b"\r")) + 1
+    last = data[at:].decode("latin-1")
+    whole = len(layout.dialect.split(last)) == len(layout.kinds)
+    return data if whole or at == 0 else data[:at]
+
+
+def _channels(frame: Any, layout: TextLayout) -> Iterator[Channel]:
+    rows = list(zip(layout.names, layout.units, layout.kinds, strict=True))
+    for k, (name, unit, kind) in enumerate(rows):
+        column = frame[k]
+        if kind == "n" and column.dtype.kind in "fiu":
+            values = column.to_numpy(dtype=np.float64)
+            empty = kind == "b" or np.isnan(values).all()
+            yield Channel(name, unit, values, bad=0 if empty else int(np.isnan(values).sum()))
+        elif kind == "n":
+            values = _numbers(column, layout)
+            yield Channel(name, unit, values, bad=int(np.isnan(values).sum()))
+        else:
+            texts = column.astype(str).to_numpy(dtype=object)
+            yield Channel(name, unit, np.full(len(texts), np.nan), text=texts)
+
+
+def _numbers(column: Any, layout: TextLayout) -> Floats:
+    """A column with unreadable cells as numbers, NaN for these."""
+    import pandas as pd
+
+    text = column.astype(str)
+    if layout.dialect.thousands:
+        text = text.str.replace(layout.dialect.thousands, "", regex=False)
+    if layout.dialect.decimal == ",":
+        text = text.str.replace(",", ".", regex=False)
+    values = pd.to_numeric(text, errors="coerce").to_numpy(dtype=np.float64)
+    return np.asarray(np.where(np.isinf(values), np.nan, values))
