@@ -11,7 +11,7 @@ from olivevib.comparison.fit import ClockFit, Seen, fit_clock
 from olivevib.comparison.forward import Nuisance, SensorMotion, nuisance, sensor_motion
 from olivevib.comparison.lag import CoarseLag, envelope_offset, fine_lag, offsets_that_overlap
 from olivevib.comparison.lines import line_differences, sensor_lines, sensor_part
-from olivevib.comparison.settings import ComparisonSettings
+from olivevib.comparison.settings import DEFAULTS, ComparisonSettings
 from olivevib.comparison.types import Comparison, LineDifference, Verdict
 from olivevib.geometry import vector_from_rotation
 from olivevib.progress import Tick, silent
@@ -33,7 +33,7 @@ def compare(
     sensor: Samples,
     marker: int,
     sensor_name: str,
-    settings: ComparisonSettings = ComparisonSettings(),
+    settings: ComparisonSettings = DEFAULTS,
     tick: Tick = silent,
 ) -> Comparison:
     """Compare the displacement (mm, at mid-exposure) of a marker with a sensor (m/s2).
@@ -101,7 +101,7 @@ class _Work:
         if middle is None:
             middle = float(np.clip(s.expected_offset_s, *limits))
         half = int(np.ceil(s.fine_half_s / s.fine_step_s))
-        offsets = middle + np.arange(-half, half + 1) * s.fine_step_s
+        offsets = np.asarray(middle + np.arange(-half, half + 1) * s.fine_step_s, np.float64)
         slow = nuisance(self.camera_s, self.slow_hz)
         return fine_lag(
             self.camera_s,
@@ -199,10 +199,9 @@ def _rival(work: _Work, lag: CoarseLag, clock: ClockFit) -> _Rival:
     noise = np.maximum(clock.noise_mm, 1e-12)
     if not np.isfinite(other.gain):
         return _Rival(True, False, abs(lag.rival_s - lag.offset_s))
-    worse = float(
-        np.sum((other.residual_mm / noise) ** 2) - np.sum((clock.residual_mm / noise) ** 2)
-    )
-    return _Rival(True, worse > _DECISIVE, abs(other.offset_s - clock.offset_s))
+    now, then = (np.sum((c.residual_mm / noise) ** 2) for c in (clock, other))
+    excluded = bool(then - now > _DECISIVE)
+    return _Rival(True, excluded, abs(other.offset_s - clock.offset_s))
 
 
 def _comparison(

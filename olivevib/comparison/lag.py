@@ -57,7 +57,7 @@ def envelope_offset(
     columns = nuisance(camera_s, slow_hz)
     optical = _rolling(camera_s, columns.out(camera_mm), hop)
     n = int((motion.end_s - motion.start_s) / 1e-3)
-    dense = motion.start_s + np.arange(n) * 1e-3
+    dense = np.asarray(motion.start_s + np.arange(n) * 1e-3, dtype=np.float64)
     sensor = _rolling(dense, motion.seen(dense, 0.0), hop)
     if optical.size < 5 or sensor.size < 5 or not (_lively(optical) and _lively(sensor)):
         return None

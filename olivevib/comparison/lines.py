@@ -30,7 +30,7 @@ def sensor_lines(sensor: Samples, low_hz: float) -> LineFit:
     top = min(_TOP_HZ, 0.49 * rate)
     facts = SamplingFacts(rate, stamps_true=True, band_hz=(min(low_hz, 0.5 * top), top))
     samples = Samples(blocks_t, blocks_a, "acceleration", "m/s2", sensor.axes)
-    return fit_line(samples, facts, LineSettings(harmonics=3, neighbours=2))
+    return fit_line(samples, facts, LineSettings(harmonics=3, neighbours=2, sway=False))
 
 
 def line_differences(
@@ -51,7 +51,7 @@ def line_differences(
     sensor, _ = _complex(basis, clock.predicted_mm)
     out = []
     for j, f in enumerate(frequencies):
-        to_m_s2 = (2 * np.pi * f) ** 2 * 1e-3 / np.sinc(f * seen.exposure_s)
+        to_m_s2 = float((2 * np.pi * f) ** 2 * 1e-3 / np.sinc(f * seen.exposure_s))
         size = float(np.linalg.norm(sensor[j]))
         turn = complex(np.vdot(sensor[j], optical[j]))
         sigma = float(np.sqrt(covariance[j] * np.sum(_share(optical[j]) * clock.noise_mm**2)))

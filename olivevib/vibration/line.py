@@ -26,12 +26,14 @@ class LineSettings:
     """How a line is looked for.
 
     false_alarm: probability that white noise alone yields a line. harmonics: highest multiple
-    fitted with the line. neighbours: how many further tones the joint fit may take in.
+    fitted with the line. neighbours: how many further tones the joint fit may take in. sway:
+    whether slow motion is fitted along where there is any (not for an accelerometer).
     """
 
     false_alarm: float = 1e-3
     harmonics: int = 3
     neighbours: int = 3
+    sway: bool = True
 
     def __post_init__(self) -> None:
         if not 0 < self.false_alarm < 1:
@@ -118,7 +120,8 @@ class _Search:
 
     def fitted(self) -> tuple[SineFit | None, Floats | None]:
         """The line above the sway first; only where there is none, one among the sway (blind)."""
-        sway = sway_columns(self.t_s, self.facts.sway_hz)
+        slow_hz = self.facts.sway_hz if self.settings.sway else 0.0
+        sway = sway_columns(self.t_s, slow_hz)
         fit = self.one(sway, self.facts.sway_hz)
         if fit is not None and sway is not None:
             rest = self.values - fit.motion(self.t_s)

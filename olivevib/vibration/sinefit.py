@@ -11,6 +11,7 @@ from olivevib.arrays import Floats
 
 _STEPS = 20
 _STOP = 1e-13  # of the frequency
+_STOP_SIGMA = 1e-4  # of its standard deviation: the step after that is smaller still
 _STEP_LIMIT = 0.3  # bins of 1/T: a Gauss-Newton step stays inside its basin (0.75 bin)
 
 
@@ -112,9 +113,10 @@ def fit_sines(
     state = problem.solve(f)
     converged = False
     for _ in range(_STEPS):
-        step = problem.step(f, state)
+        step, sigma = problem.step(state)
         f, state, moved = problem.search(f, state, step)
-        converged = bool(np.all(np.abs(step) <= _STOP * np.abs(f)))
+        small = np.maximum(_STOP * np.abs(f), _STOP_SIGMA * sigma)
+        converged = bool(np.all(np.abs(step) <= small))
         if converged or not moved:
             break
     return problem.result(f, state, converged or not moved)
@@ -133,7 +135,7 @@ class _State:
 
     @property
     def noise(self) -> Floats:
-        """Size of the residual, an axis, with a floor so that a clean axis keeps a finite weight."""
+        """Size of the residual per axis, with a floor: a clean axis keeps a finite weight."""
         rms = np.sqrt(np.mean(self.residual**2, axis=0))
         floor = max(1e-6 * float(rms.max()), 1e-15 * float(np.abs(self.coefficients).max()))
         return np.asarray(np.maximum(rms, floor if floor > 0 else 1.0))
@@ -199,11 +201,13 @@ class _Problem:
             np.einsum("knc,nc->k", free, state.residual / state.noise),
         )
 
-    def step(self, f: Floats, state: _State) -> Floats:
+    def step(self, state: _State) -> tuple[Floats, Floats]:
+        """The Gauss-Newton step of the frequencies, limited, and their standard deviations."""
         information, score = self.information(state)
         step = np.linalg.lstsq(information, score, rcond=1e-14)[0]
         limit = _STEP_LIMIT / self.span_s
-        return np.asarray(np.clip(step, -limit, limit))
+        sigma = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+        return np.asarray(np.clip(step, -limit, limit)), np.asarray(sigma)
 
     def search(self, f: Floats, state: _State, step: Floats) -> tuple[Floats, _State, bool]:
         """Halve the step until the weighted residual does not grow; (f, state, moved)."""

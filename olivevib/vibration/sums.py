@@ -49,7 +49,7 @@ def _kernel(z: Floats) -> Floats:
 
 def _kernel_transform(turns_per_cell: Floats) -> Floats:
     """Fourier transform of the kernel by Gauss-Legendre quadrature."""
-    nodes, weights = np.polynomial.legendre.leggauss(64)
-    half = _WIDTH / 2
-    waves = np.cos(2 * np.pi * np.outer(turns_per_cell, nodes * half))
-    return np.asarray(waves @ (weights * half * _kernel(nodes)))
+    nodes, weights = np.polynomial.legendre.leggauss(32)
+    z = (nodes + 1) / 2  # half of a symmetric kernel
+    waves = np.cos(np.pi * _WIDTH * np.outer(turns_per_cell, z))
+    return np.asarray(waves @ (weights * _WIDTH / 2 * _kernel(z)))
