@@ -1,0 +1,97 @@
+"""What one trial report is made from: frozen values of the trial, nothing of the disk."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from olivevib.arrays import Floats, floats
+from olivevib.comparison import Comparison
+from olivevib.errors import Caution
+from olivevib.geometry import StereoRig
+from olivevib.reconstruction.trajectory import Trajectory
+from olivevib.report.clean import clean
+from olivevib.tracking import Track
+from olivevib.vibration import Line, Phase, Spectrum, Vibration
+
+_NO_RESIDUALS = np.empty((0, 4))
+_NO_DISTANCES = np.empty((0, 2))
+
+
+@dataclass(frozen=True)
+class CalibrationView:
+    """What the stored calibration says of itself.
+
+    left, right (K, 4): pixel position u, v and residual du, dv of each board point. holdout
+    (D, 2): true distance and error of each board distance on frames the fit never saw, mm.
+    facts: key (with unit suffix) and value; verdict: one sentence.
+    """
+
+    left: Floats = field(default_factory=lambda: _NO_RESIDUALS)
+    right: Floats = field(default_factory=lambda: _NO_RESIDUALS)
+    holdout_mm: Floats = field(default_factory=lambda: _NO_DISTANCES)
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    verdict: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "left", floats("left", self.left, (None, 4)))
+        object.__setattr__(self, "right", floats("right", self.right, (None, 4)))
+        object.__setattr__(self, "holdout_mm", floats("holdout_mm", self.holdout_mm, (None, 2)))
+
+
+@dataclass(frozen=True)
+class ReportContent:
+    """Everything that one report shows.
+
+    record: sections of trial.toml (session, tree, machine, markers, …) as plain values. summary:
+    the content of ``show --json``. places: words for each marker id. provenance: versions,
+    settings and hashes as plain text, ``command`` among them.
+    """
+
+    name: str
+    record: Mapping[str, Any] = field(default_factory=dict)
+    summary: Mapping[str, Any] = field(default_factory=dict)
+    places: Mapping[int, str] = field(default_factory=dict)
+    simulated: bool = False
+    rig: StereoRig | None = None
+    calibration: CalibrationView | None = None
+    tracks: tuple[Track, ...] = ()
+    trajectory: Trajectory | None = None
+    vibration: Vibration | None = None
+    comparison: Comparison | None = None
+    cautions: tuple[Caution, ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def marker_name(self, marker_id: int, longest: int = 28) -> str:
+        """``3 · trunk``, or the id alone where no place was entered."""
+        place = clean(self.places.get(marker_id, ""), longest)
+        return f"{marker_id} · {place}" if place else f"{marker_id}"
+
+    def names(self) -> dict[int, str]:
+        """The name of every marker that any result mentions."""
+        ids: set[int] = set(self.places) | {t.id for t in self.tracks}
+        if self.trajectory is not None:
+            ids |= {int(i) for i in self.trajectory.ids}
+        if self.displacement is not None:
+            ids |= {int(i) for i in self.displacement.ids}
+        return {i: self.marker_name(i) for i in sorted(ids)}
+
+    @property
+    def displacement(self) -> Spectrum | None:
+        """The displacement spectrum, whose lines every table quotes."""
+        return None if self.vibration is None else self.vibration.spectra.get("displacement")
+
+    @property
+    def phases(self) -> tuple[Phase, ...]:
+        """The phases of the trial, in order."""
+        return () if self.vibration is None else self.vibration.phases
+
+    def lines(self) -> dict[int, Line]:
+        """The dominant displacement line of each marker."""
+        spectrum = self.displacement
+        if spectrum is None:
+            return {}
+        return {int(i): line for i, line in zip(spectrum.ids, spectrum.lines, strict=True)}

@@ -1,0 +1,36 @@
+"""Figures of the reports: each a pure function from frozen values to an SVG string."""
+
+from __future__ import annotations
+
+from olivevib.report.figures.distances import Distance, distances, pair_distances
+from olivevib.report.figures.frequency import frequencies
+from olivevib.report.figures.motion import Window, time_series, whole
+from olivevib.report.figures.orbits import MOST_ACROSS, orbit_reach_mm, orbits
+from olivevib.report.figures.residuals import holdout, residual_map
+from olivevib.report.figures.scene import scene
+from olivevib.report.figures.sensor import overlay
+from olivevib.report.figures.sigma import sigmas
+from olivevib.report.figures.spectra import describe, spectrum_rows
+from olivevib.report.figures.visibility import strips, visibility
+
+__all__ = [
+    "MOST_ACROSS",
+    "Distance",
+    "Window",
+    "describe",
+    "distances",
+    "frequencies",
+    "holdout",
+    "orbit_reach_mm",
+    "orbits",
+    "overlay",
+    "pair_distances",
+    "residual_map",
+    "scene",
+    "sigmas",
+    "spectrum_rows",
+    "strips",
+    "time_series",
+    "visibility",
+    "whole",
+]

@@ -1,0 +1,266 @@
+"""The paper that every figure is drawn on: size, palette, fonts, and how it becomes an SVG string.
+
+Colours are drawn as fixed tokens and leave as CSS variables with a fallback, so that one figure
+serves light and dark pages and stands alone as a file. Axes differ by line style as well as by
+colour. The bytes depend on nothing but the values: no date, no random ids.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from html import escape
+from itertools import pairwise
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
+
+from olivevib.arrays import Bools, Floats
+from olivevib.report.clean import clean
+
+WIDTH_IN = 8.6  # every figure has the width of the page
+INK, QUIET, GRID, SHADE = "#1c2127", "#5b6570", "#d4dae1", "#eaeef3"
+AXIS_COLOURS = ("#0072b1", "#d45e01", "#009e72")  # x, y, z: told apart by colour-blind readers
+AXIS_STYLES: tuple[Any, ...] = ("-", (0, (4, 1.4)), (0, (1.2, 1.2)))
+MARK, LEFT, RIGHT, SECOND = "#a8337f", "#33659c", "#b3541f", "#8a949f"
+_VARIABLES = {
+    INK: "--ink",
+    QUIET: "--quiet",
+    GRID: "--grid",
+    SHADE: "--shade",
+    AXIS_COLOURS[0]: "--x",
+    AXIS_COLOURS[1]: "--y",
+    AXIS_COLOURS[2]: "--z",
+    MARK: "--mark",
+    LEFT: "--left",
+    RIGHT: "--right",
+    SECOND: "--second",
+}
+_FONTS = ["DejaVu Sans", "Verdana", "Bitstream Vera Sans", "Arial", "sans-serif"]
+_STYLE: Any = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "olivevib",
+    "text.parse_math": False,
+    "text.usetex": False,
+    "axes.formatter.use_mathtext": False,
+    "font.family": "sans-serif",
+    "font.sans-serif": _FONTS,
+    "font.size": 8,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": QUIET,
+    "axes.linewidth": 0.6,
+    "axes.facecolor": "none",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.labelsize": 8,
+    "axes.titlesize": 8,
+    "axes.labelpad": 2.5,
+    "xtick.color": QUIET,
+    "ytick.color": QUIET,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "grid.color": GRID,
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 0.9,
+    "hatch.linewidth": 0.5,
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "path.simplify": True,
+    "path.simplify_threshold": 0.05,
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """The one style of all figures, for as long as one is drawn."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        yield
+
+
+def draw(name: str, title: str, height_in: float, paint: Callable[[Figure], None]) -> str:
+    """One figure as an SVG string: ``paint`` draws on an empty Figure of the page's width.
+
+    ``name`` prefixes every id in it, so that many figures share one page; ``title`` is read aloud
+    by screen readers.
+    """
+    with style():
+        figure = Figure(figsize=(WIDTH_IN, height_in))
+        paint(figure)
+        buffer = io.StringIO()
+        nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
+        figure.savefig(buffer, format="svg", metadata=nothing)
+    return _tidy(buffer.getvalue(), name, title)
+
+
+def _tidy(svg: str, name: str, title: str) -> str:
+    """Strip the prologue, shorten numbers, make ids unique and colours themable."""
+    body = svg[svg.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", body, flags=re.S)
+    body = _shorten_ids(body, name)
+    body = re.sub(r' d="([^"]*)"', lambda m: f' d="{_short_path(m[1])}"', body)
+    body = re.sub(r' (x|y|width|height)="(-?\d+\.\d{3,})"', _short_attribute, body)
+    for colour, variable in _VARIABLES.items():
+        body = body.replace(colour, f"var({variable},{colour})")
+    body = re.sub(r">\s+<", "><", body)
+    box = re.search(r'viewBox="[^"]*"', body)
+    start = body.index(">") + 1
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
+        f'{box[0] if box else ""} role="img" class="figure" aria-label="{escape(clean(title))}">'
+    )
+    return head + body[start:].rstrip()
+
+
+def _shorten_ids(body: str, name: str) -> str:
+    """Keep only ids that something refers to, numbered in order behind the figure's name."""
+    used = list(dict.fromkeys(re.findall(r'(?:url\(#|href="#)([^")]+)', body)))
+    short = {old: f"{name}-{i}" for i, old in enumerate(used)}
+
+    def of_id(match: re.Match[str]) -> str:
+        return f' id="{short[match[1]]}"' if match[1] in short else ""
+
+    body = re.sub(r' id="([^"]*)"', of_id, body)
+    return re.sub(r'(url\(#|href="#)([^")]+)', lambda m: m[1] + short[m[2]], body)
+
+
+def _short_path(path: str) -> str:
+    """A path with two decimals, and without the letters that SVG lets one leave out."""
+    path = re.sub(r"-?\d+\.\d+", lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), path)
+    if not re.search("[CQSA]", path):
+        path = path.replace("L", " ")
+    path = re.sub(r"\s+", " ", path).strip()
+    return re.sub(r" ?([A-Za-z]) ?", r"\1", path)
+
+
+def _short_attribute(match: re.Match[str]) -> str:
+    return f' {match[1]}="{float(match[2]):.2f}"'
+
+
+def rows_and_columns(
+    figure: Figure,
+    rows: int,
+    columns: int,
+    *,
+    margins_in: Sequence[float],
+    gaps_in: Sequence[float],
+) -> list[list[Axes]]:
+    """A grid of axes with margins (left, right, top, bottom) and gaps (across, down) in inches."""
+    width, height = figure.get_size_inches()
+    left, right, top, bottom = margins_in
+    across, down = gaps_in
+    w = (width - left - right - across * (columns - 1)) / columns
+    h = (height - top - bottom - down * (rows - 1)) / rows
+    grid: list[list[Axes]] = []
+    for r in range(rows):
+        y = height - top - h * (r + 1) - down * r
+        row = [
+            figure.add_axes(((left + (w + across) * c) / width, y / height, w / width, h / height))
+            for c in range(columns)
+        ]
+        grid.append(row)
+    return grid
+
+
+def note(figure: Figure, x_in: float, y_in: float, text: str, **how: Any) -> None:
+    """Text at inches from the left and from the top of the figure."""
+    width, height = figure.get_size_inches()
+    figure.text(x_in / width, 1 - y_in / height, clean(text), **how)
+
+
+def key(
+    figure: Figure, x_in: float, y_in: float, entries: Sequence[tuple[str, dict[str, Any]]]
+) -> None:
+    """A legend in one line: each entry is a short line in its own style, then its word."""
+    width, height = figure.get_size_inches()
+    y = 1 - y_in / height
+    for word, how in entries:
+        line = Line2D(
+            [(x_in + d) / width for d in (0, 0.15, 0.3)],
+            [y, y, y],
+            markevery=[1],
+            transform=figure.transFigure,
+            **how,
+        )
+        figure.add_artist(line)
+        figure.text((x_in + 0.36) / width, y, word, va="center", fontsize=7, color=QUIET)
+        x_in += 0.55 + 0.065 * len(word)
+
+
+def dots(ax: Axes, x: Floats, y: Floats, size_pt: float, colour: str) -> None:
+    """Small round dots as one path: a tenth of the bytes that markers take in an SVG."""
+    good = np.isfinite(x) & np.isfinite(y)
+    n = int(good.sum())
+    if n == 0:
+        return
+    ends = np.repeat(np.column_stack([x[good], y[good]]), 2, axis=0)
+    codes = np.tile(np.array([Path.MOVETO, Path.LINETO], dtype=np.uint8), n)
+    patch = PathPatch(Path(ends, codes), fill=False, edgecolor=colour, lw=size_pt, capstyle="round")
+    ax.add_patch(patch)
+    ax.update_datalim(ends)
+
+
+def row_names(figure: Figure, grid: Sequence[Sequence[Axes]], names: Sequence[str]) -> None:
+    """A bold name above the first panel of each row."""
+    height = figure.get_size_inches()[1]
+    for row, name in zip(grid, names, strict=True):
+        box = row[0].get_position()
+        y = box.y1 + 0.04 / height
+        figure.text(box.x0, y, clean(name), fontsize=7.5, fontweight="bold", va="bottom")
+
+
+def column_heads(figure: Figure, grid: Sequence[Sequence[Axes]], heads: Sequence[str]) -> None:
+    """x, y, z with their unit above the three columns, each in its colour."""
+    height = figure.get_size_inches()[1]
+    for ax, head, colour in zip(grid[0], heads, AXIS_COLOURS, strict=True):
+        box = ax.get_position()
+        middle = box.x0 + box.width / 2
+        figure.text(middle, 1 - 0.1 / height, head, ha="center", va="center", color=colour,
+                    fontsize=8, fontweight="bold")  # fmt: skip
+
+
+def thin(t: Floats, values: Floats, most: int = 1600) -> tuple[Floats, Floats]:
+    """A long trace as the smallest and largest value of each of ``most``/2 stretches.
+
+    What is drawn covers the same area; NaN stays a gap where a whole stretch is NaN.
+    """
+    n = t.size
+    if n <= most:
+        return t, values
+    edges = np.linspace(0, n, most // 2 + 1).astype(int)
+    at: list[int] = []
+    for first, last in pairwise(edges):
+        part = values[first:last]
+        if np.isnan(part).all():
+            at += [first, last - 1]
+        else:
+            at += sorted((first + int(np.nanargmin(part)), first + int(np.nanargmax(part))))
+    return t[at], values[at]
+
+
+def runs(flags: Bools) -> list[tuple[int, int]]:
+    """Stretches [first, last) where ``flags`` (N,) is True."""
+    padded = np.concatenate([[False], flags, [False]]).astype(np.int8)
+    steps = np.diff(padded)
+    starts, ends = np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)
+    return [(int(a), int(b)) for a, b in zip(starts, ends, strict=True)]
+
+
+def digest(text: str) -> str:
+    """A short fingerprint of a figure, for provenance and tests."""
+    return hashlib.sha256(text.encode()).hexdigest()[:12]

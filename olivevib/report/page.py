@@ -1,0 +1,122 @@
+"""The page of one trial: self-contained HTML from frozen values."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+import jinja2
+
+from olivevib.progress import Tick, silent
+from olivevib.report import tables
+from olivevib.report.clean import clean
+from olivevib.report.content import ReportContent
+from olivevib.report.plates import Plate, plates
+from olivevib.report.verdict import MEANING, verdict
+from olivevib.signals import State
+
+
+@dataclass(frozen=True)
+class Section:
+    """One heading of the page; ``name`` is its anchor."""
+
+    name: str
+    title: str
+
+
+SECTIONS = (
+    Section("markers", "Markers"),
+    Section("paths", "Cameras, markers and paths"),
+    Section("motion", "Displacement"),
+    Section("frequency", "Frequency"),
+    Section("spectra", "Amplitude spectrum"),
+    Section("psd", "Power spectral density"),
+    Section("orbits", "Orbits"),
+    Section("comparison", "Camera against accelerometer"),
+    Section("distances", "Distances between markers"),
+    Section("seen", "When each marker was seen"),
+    Section("sigma", "How well each position is known"),
+    Section("calibration", "Rig and calibration"),
+    Section("timing", "Timing"),
+    Section("record", "Session record"),
+    Section("provenance", "Provenance"),
+)
+
+
+def environment() -> jinja2.Environment:
+    """Templates that escape everything and refuse an unknown name."""
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("olivevib.report"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def render_page(content: ReportContent, tick: Tick = silent) -> str:
+    """One trial as an HTML document: inline style and figures, no script, no request anywhere."""
+    drawn: dict[str, list[Plate]] = defaultdict(list)
+    for plate in plates(content, tick):
+        drawn[plate.section].append(plate)
+    statuses = {line.status for line in content.lines().values()}
+    template = environment().get_template("trial.html.j2")
+    return template.render(
+        name=clean(content.name),
+        simulated=content.simulated,
+        sections=SECTIONS,
+        plates=drawn,
+        verdict=verdict(content),
+        cautions=[(clean(c.code, 60), clean(c.text), clean(c.remedy)) for c in content.cautions],
+        heading=_heading(content),
+        markers=tables.marker_rows(content),
+        meanings=[(str(s), words) for s, words in MEANING.items() if s in statuses],
+        reasons=_reasons(content),
+        record=tables.record_sections(content),
+        rig=tables.rig_pairs(content),
+        cameras=tables.camera_columns(content),
+        calibration_verdict=clean(content.calibration.verdict) if content.calibration else "",
+        timing=tables.timing_pairs(content),
+        states=[s.word for s in State],
+        state_rows=tables.state_rows(content),
+        comparison=tables.comparison_pairs(content),
+        comparison_lines=tables.comparison_lines(content),
+        comparison_words=_comparison_words(content),
+        frame=clean(content.trajectory.frame) if content.trajectory else "",
+        phases=[
+            (clean(p.name, 30), f"{p.start_s:.2f} – {p.end_s:.2f}\u00a0s") for p in content.phases
+        ],
+        stages=tables.stage_rows(content),
+        command=clean(content.provenance.get("command", "")),
+        provenance=tables.provenance_pairs(content),
+    )
+
+
+def _heading(content: ReportContent) -> list[str]:
+    """What identifies the trial: date, place, cultivar, machine, where they were typed."""
+    wanted = {"session": ("date", "place", "operator"), "tree": ("id", "cultivar"),
+              "machine": ("make", "type")}  # fmt: skip
+    out = []
+    for section, key in ((s, k) for s, keys in wanted.items() for k in keys):
+        value = (content.record.get(section) or {}).get(key)
+        if value not in (None, ""):
+            out.append(f"tree {clean(value, 60)}" if key == "id" else clean(value, 60))
+    return out
+
+
+def _reasons(content: ReportContent) -> list[tuple[str, str]]:
+    """Why lines have their status: each reason once, with the markers that it holds for."""
+    found: dict[str, list[str]] = defaultdict(list)
+    for marker_id, line in content.lines().items():
+        for reason in line.reasons:
+            found[clean(reason)].append(str(marker_id))
+    every = len(content.lines())
+    return [("all" if len(ids) == every else ", ".join(ids), why) for why, ids in found.items()]
+
+
+def _comparison_words(content: ReportContent) -> str:
+    if content.comparison is None:
+        stage = (content.summary.get("stages") or {}).get("compare") or {}
+        reason = clean(stage.get("reason") or "")
+        return "Not compared" + (f": {reason}." if reason else ".")
+    return f"{content.comparison.verdict}: {clean(content.comparison.reason)}."

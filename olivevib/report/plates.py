@@ -1,0 +1,204 @@
+"""Which figures a trial can show, in what order, and the words below each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olivevib.progress import Tick, silent
+from olivevib.report import figures
+from olivevib.report.content import ReportContent
+from olivevib.report.verdict import strongest
+from olivevib.report.words import number
+from olivevib.vibration.types import Line
+
+ROWS = 8  # markers in one figure
+CLOSE_S = 1.0  # length of the close-up
+STRIPS = 36  # state strips in one figure
+
+
+@dataclass(frozen=True)
+class Plate:
+    """One figure of the page: its section, the SVG and what a person should see in it."""
+
+    section: str
+    svg: str
+    caption: str
+
+
+_Job = tuple[str, str, Callable[[], str]]  # section, caption, what draws it
+
+
+def plates(content: ReportContent, tick: Tick = silent) -> list[Plate]:
+    """All figures that the content allows, in the order of the page; none is ever empty."""
+    jobs = [*_space(content), *_spectra(content), *_quality(content)]
+    out = []
+    for done, (section, caption, drawing) in enumerate(jobs):
+        tick(done, len(jobs), f"drawing: {section}")
+        out.append(Plate(section, drawing(), caption))
+    tick(len(jobs), len(jobs), "figures drawn")
+    return out
+
+
+def _groups(ids: Sequence[int], size: int) -> list[list[int]]:
+    """The ids in groups of nearly equal length, at most ``size``."""
+    if not ids:
+        return []
+    parts = np.array_split(np.array(ids), -(-len(ids) // size))
+    return [[int(i) for i in part] for part in parts]
+
+
+def seen_ids(content: ReportContent) -> list[int]:
+    """The markers that have at least two positions in space, by id."""
+    path = content.trajectory
+    if path is None:
+        return []
+    return sorted(
+        int(i) for i, n in zip(path.ids, np.add.reduce(path.seen, axis=0), strict=True) if n >= 2
+    )
+
+
+def _space(content: ReportContent) -> Iterator[_Job]:
+    path, names, ids = content.trajectory, content.names(), seen_ids(content)
+    rig, lines = content.rig, content.lines()
+    if rig is not None:
+        yield ("paths", _SCENE, lambda: figures.scene(rig, path, names))
+    if path is None or not ids:
+        return
+    for group in _groups(ids, ROWS):
+        yield ("motion", _MOTION, _bound(figures.time_series, path, names, group,
+                                         figures.whole(path), content.phases))  # fmt: skip
+    close = _close(content, ids)
+    yield (
+        "motion",
+        _CLOSE,
+        lambda: figures.time_series(path, names, close[1], close[0], (), lines),
+    )
+    reach = figures.orbit_reach_mm(path, ids)
+    for group in _groups(ids, figures.MOST_ACROSS):
+        caption = _ORBITS.format(reach=number(reach, 3))
+        yield ("orbits", caption, _bound(figures.orbits, path, names, group, reach, lines))
+    pairs = figures.pair_distances(path)
+    if pairs:
+        yield ("distances", _DISTANCES, lambda: figures.distances(path, pairs, names))
+
+
+def _bound(function: Callable[..., str], *values: object) -> Callable[[], str]:
+    return lambda: function(*values)
+
+
+def _close(content: ReportContent, ids: Sequence[int]) -> tuple[figures.Window, list[int]]:
+    """A second in the middle of the steady phase, of the three markers that move most."""
+    path = content.trajectory
+    assert path is not None
+    steady = [span for span in content.phases if span.name == "steady"]
+    whole = figures.whole(path)
+    start, end = (steady[0].start_s, steady[0].end_s) if steady else (whole.start_s, whole.end_s)
+    middle = (start + end) / 2
+    window = figures.Window(middle - CLOSE_S / 2, middle + CLOSE_S / 2, close=True)
+    lines = content.lines()
+
+    def size(marker_id: int) -> float:
+        line = lines.get(marker_id)
+        total = 0.0 if line is None else float(np.sum(line.amplitude**2))
+        return total if np.isfinite(total) else 0.0
+
+    first = strongest(content)
+    ranked = sorted(ids, key=lambda i: (first is None or i != first[0], -size(i)))
+    return window, sorted(ranked[:3])
+
+
+def _spectra(content: ReportContent) -> Iterator[_Job]:
+    spectrum, names = content.displacement, content.names()
+    if spectrum is None or not spectrum.ids.size:
+        return
+    of = _window_words(content)
+    yield ("frequency", _FREQUENCY, lambda: figures.frequencies(spectrum, names))
+    finite = np.isfinite(spectrum.amplitude)
+    ids = sorted(int(i) for m, i in enumerate(spectrum.ids) if finite[:, m].any())
+    for kind, words in (("amplitude", _AMPLITUDE), ("psd", _PSD)):
+        for group in _groups(ids, ROWS):
+            job = _bound(figures.spectrum_rows, spectrum, names, group, kind)
+            yield ("spectra" if kind == "amplitude" else "psd", words + of, job)
+
+
+def _window_words(content: ReportContent) -> str:
+    s = content.displacement
+    assert s is not None
+    return (
+        f" Displacement; {s.window} window, {number(s.resolution_hz, 3)} Hz between bins, noise"
+        f" bandwidth {number(s.enbw_bins, 3)} bins; axis up to half the frame rate,"
+        f" {number(float(s.f_hz[-1]), 4)} Hz."
+    )
+
+
+def _quality(content: ReportContent) -> Iterator[_Job]:
+    path, names, view, rig = (
+        content.trajectory, content.names(), content.calibration, content.rig,
+    )  # fmt: skip
+    rows = figures.strips(content.tracks, path, names)
+    for part in range(0, len(rows), STRIPS):
+        job = _bound(figures.visibility, rows[part : part + STRIPS], part)
+        yield ("seen", _SEEN, job)
+    if path is not None and np.isfinite(path.sigma_xyz_mm).any():
+        yield ("sigma", _SIGMA, lambda: figures.sigmas(path, names))
+    if view is not None and rig is not None and len(view.left) and len(view.right):
+        sizes = {"left": rig.left.size_px, "right": rig.right.size_px}
+        yield ("calibration", _RESIDUALS, lambda: figures.residual_map(view, sizes))
+    if view is not None and len(view.holdout_mm) > 1:
+        yield ("calibration", _HOLDOUT, lambda: figures.holdout(view))
+    comparison = content.comparison
+    if comparison is not None and np.isfinite(comparison.optical_mm).any():
+        yield ("comparison", _SENSOR, lambda: figures.overlay(comparison))
+
+
+def sizes_mm(line: Line) -> float:
+    """The resultant amplitude of a line, mm."""
+    return float(np.linalg.norm(line.amplitude))
+
+
+_SCENE = (
+    "Both cameras with what they see, and the path of each marker (numbers are marker ids)."
+    " Coordinates are those of the left camera: x to the right, y down, z away from it."
+)
+_MOTION = (
+    "Displacement of each marker from its mean position. One scale a row; a gap is a gap, with a"
+    " bar at the bottom where the marker was not located; circles are doubtful samples; grey:"
+    " start-up, shut-down and decay."
+)
+_CLOSE = (
+    "One second of the markers that move most: dots are single frames, the thin grey curve is the"
+    " fitted line where its frequency is known."
+)
+_ORBITS = (
+    "Path about the mean position in three projections, all on one scale of ± {reach} mm."
+    " Dots: single frames. Thick: the ellipse of the dominant line."
+)
+_DISTANCES = (
+    "Distances between markers. On one rigid body they should not change: what remains there is"
+    " the error of the whole chain. Left: standard deviation of every pair, larger squares vary"
+    " more. Right: the steadiest and the least steady pairs and some between."
+)
+_FREQUENCY = (
+    "Dominant line of each marker. Filled: known. Open: a candidate; the pictures alone cannot"
+    " tell it from the others (per cent: how likely, where that can be said). White ground: below"
+    " half the frame rate."
+)
+_AMPLITUDE = (
+    "Amplitude spectrum (peak). Dashed: the dominant line as this frame rate shows it, the"
+    " triangle its fitted amplitude. Dotted: noise floor."
+)
+_PSD = "Power spectral density. Dashed: the dominant line; dotted: noise floor."
+_SEEN = "State of every sample: full height means located; the thinner, the less is known."
+_SIGMA = (
+    "How well one position is known: median (symbol) and the middle 90 % of the frames (bar)."
+    " Depth (z) is weaker than x and y by about the distance over the baseline."
+)
+_RESIDUALS = "What the calibration leaves over at each board point, as needles."
+_HOLDOUT = "Known distances of the board, measured on frames that the calibration never saw."
+_SENSOR = (
+    "The displacement that the accelerometer predicts at the camera's own instants, and what the"
+    " camera saw. Left: the stretch that moves most; right: the difference over the whole record."
+)

@@ -1,0 +1,100 @@
+"""The verdict of a trial in three plain sentences: what was seen, how it moves, what to trust."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olivevib.report.content import ReportContent
+from olivevib.report.figures.spectra import describe
+from olivevib.report.tables import candidate_accelerations
+from olivevib.report.words import count, measure, number, percent, triple
+from olivevib.vibration.types import Line, LineStatus
+
+MEANING: dict[LineStatus, str] = {
+    LineStatus.DIRECT: "sampled more than twice as fast as the declared band, so no alias exists",
+    LineStatus.CONFIRMED: "decided by the times at which the rows were read, and checked",
+    LineStatus.SUPPORTED: "probably so; another frequency is not excluded",
+    LineStatus.AMBIGUOUS: "two or more frequencies explain the pictures equally well",
+    LineStatus.BLIND: "looks like slow sway at this frame rate; no amplitude is given",
+    LineStatus.CHIRP: "the speed changes too fast to resolve a line",
+    LineStatus.ALIASED: "peaks of samples only: each could be any of the candidates",
+    LineStatus.NONE: "no line stands out of the noise",
+}
+
+
+def verdict(content: ReportContent) -> tuple[str, str, str]:
+    """Three sentences; each says what is not known rather than leaving it out."""
+    return _seen(content), _vibration(content), _trust(content)
+
+
+def _seen(content: ReportContent) -> str:
+    path = content.trajectory
+    if path is None or not path.seen.any():
+        return "No marker has been located in space yet."
+    found = path.seen.any(axis=0)
+    share = float(np.median(path.seen[:, found].mean(axis=0)))
+    sigma = np.nanmedian(path.sigma_xyz_mm[path.seen], axis=0)
+    known = triple(sigma, "mm")
+    span = measure(path.t_s[-1] - path.t_s[0], "s", digits=3)
+    return (
+        f"{count(int(found.sum()), 'marker')} were located in space over {span}"
+        f" ({count(path.t_s.size, 'frame')}); half of them in at least {percent(share)} of the"
+        f" frames, each position to {known} (x / y / z, one standard deviation)."
+    ).replace("1\u00a0marker were", "1\u00a0marker was")
+
+
+def strongest(content: ReportContent) -> tuple[int, Line] | None:
+    """The marker whose line is largest, and that line."""
+    lines = {
+        i: line for i, line in content.lines().items() if np.isfinite(line.amplitude).all()
+    }  # fmt: skip
+    if not lines:
+        return None
+    best = max(lines, key=lambda i: float(np.sum(lines[i].amplitude ** 2)))
+    return best, lines[best]
+
+
+def _vibration(content: ReportContent) -> str:
+    if not content.lines():
+        return "Its vibration has not been analysed yet."
+    found = strongest(content)
+    if found is None:
+        return "No vibration line stands out of the noise at any marker."
+    marker_id, line = found
+    name = content.marker_name(marker_id)
+    axis = int(np.argmax(line.amplitude))
+    size = measure(line.amplitude[axis], "mm", line.amplitude_sigma[axis])
+    moves = f"by {size} (peak) along {'xyz'[axis]}"
+    if line.status in (LineStatus.AMBIGUOUS, LineStatus.ALIASED) and line.candidates_hz:
+        either = " or ".join(number(f) for f in line.candidates_hz[:4])
+        rms = candidate_accelerations(line)[:4]
+        shake = " or ".join(number(a, 3) for _, a, _ in rms)
+        return (
+            f"Marker {name} moves most, {moves}, but its frequency is {line.status}: {either} Hz"
+            f" all give these pictures, so its acceleration is {shake} m/s² rms; nothing here"
+            " decides which."
+        )
+    others = [other.status for i, other in content.lines().items() if i != marker_id]
+    same = sum(status is line.status for status in others)
+    rest = f"; {same} of the {len(others)} others are {line.status} too" if others else ""
+    return f"Marker {name} moves most, {moves}, at {describe(line)}{rest}."
+
+
+def _trust(content: ReportContent) -> str:
+    calibration = content.summary.get("calibration") or {}
+    mm, share = calibration.get("holdout_rms_mm"), calibration.get("holdout_rms_percent")
+    parts = []
+    if mm is None and share is None:
+        parts.append("How well the calibration measures distances is not known")
+    else:
+        parts.append(
+            "Distances on calibration views that the fit never saw are right to"
+            f" {measure(mm, 'mm', digits=2)} ({measure(share, '%', digits=2)}) rms"
+        )
+    if content.comparison is None:
+        parts.append("there is no accelerometer to compare with")
+    else:
+        parts.append(f"camera and accelerometer: {content.comparison.verdict}")
+    n = len(content.cautions)
+    parts.append("no warning was raised" if n == 0 else f"{count(n, 'warning')} to read below")
+    return "; ".join(parts) + "."
