@@ -22,6 +22,8 @@ from olivevib.errors import Caution
 from olivevib.files.container import has_stamps, open_container, video_path
 from olivevib.progress import Tick, silent
 
+_NUT_INDEX = bytes.fromhex("4e58dd672f23e64e")  # start code of the index, NUT specification
+
 
 @dataclass(frozen=True)
 class Slip:
@@ -52,7 +54,7 @@ class Packets:
         self._stream = stream
         self._count = 0
         self._first_s = np.inf
-        self._end_s = -np.inf
+        self._last_s = self._end_s = -np.inf
         self._last_cut = False
         self._broke = ""
 
@@ -82,6 +84,7 @@ class Packets:
         if pts is not None:
             lasts = _seconds(packet.duration or 0, packet.time_base)
             self._first_s = min(self._first_s, stamp)
+            self._last_s = max(self._last_s, stamp)
             self._end_s = max(self._end_s, stamp + lasts)
         self._last_cut = packet.is_corrupt
         order = (last if pts is None else pts) if self.reorders else self._count
@@ -91,14 +94,14 @@ class Packets:
 
     def shortfall(self) -> Caution | None:
         """After the walk: what is missing at the end of the recording, or None."""
-        stream, name = self._stream, self._container.format.name
-        expected = stream.frames or self._expected_by_duration()
-        unclosed = name == "nut" and not len(stream.index_entries)
-        short = expected is not None and self._count < expected
-        if not (short or self._last_cut or self._broke or unclosed):
+        name = self._container.format.name
+        exact = self._stream.frames if name != "avi" else 0  # an AVI counts its empty slots too
+        expected = exact or self._expected_by_duration() or 0
+        unclosed = name == "nut" and not _nut_is_closed(self.path)
+        if not (self._count < expected or self._last_cut or self._broke or unclosed):
             return None
-        about = "" if stream.frames else "about "
-        meant = f" of {about}{expected} expected" if short else ""
+        about = "" if exact else "about "
+        meant = f" of {about}{expected} expected" if self._count < expected else ""
         why = f" ({self._broke})" if self._broke else ""
         return Caution(
             "video-truncated",
@@ -110,17 +113,18 @@ class Packets:
     def _expected_by_duration(self) -> int | None:
         """Frames that the declared duration stands for, where it is this stream's own."""
         declared = _declared_s(self._container, self._stream)
-        if declared is None or not np.isfinite(self._end_s) or self._count < 2:
+        if declared is None or not np.isfinite(self._last_s) or self._count < 2:
             return None
-        rate = self._stream.average_rate
-        step = 1 / rate if rate else (self._end_s - self._first_s) / self._count
+        step = (self._last_s - self._first_s) / (self._count - 1)
         if not declared - self._end_s > 1.5 * step > 0:
             return None
         return max(self._count + 1, round((declared - self._first_s) / step))
 
 
 def _declared_s(container: InputContainer, stream: VideoStream) -> float | None:
-    """When this stream ends according to a Matroska header, s on the clock of its stamps."""
+    """When this stream ends according to its header, s on the clock of its stamps."""
+    if container.format.name == "avi" and stream.frames:
+        return _seconds(stream.frames, stream.time_base or Fraction(1))
     if "matroska" not in container.format.name:
         return None
     tag = stream.metadata.get("DURATION", "")
@@ -131,6 +135,18 @@ def _declared_s(container: InputContainer, stream: VideoStream) -> float | None:
     if len(container.streams) == 1 and container.duration:
         return container.duration / av.time_base
     return None
+
+
+def _nut_is_closed(path: Path) -> bool:
+    """True where a NUT file ends with its index, which is written when the recorder closes it."""
+    with path.open("rb") as handle:
+        size = handle.seek(0, 2)
+        handle.seek(max(0, size - 12))
+        back = int.from_bytes(handle.read(8), "big")
+        if not 0 < back <= size:
+            return False
+        handle.seek(size - back)
+        return handle.read(8) == _NUT_INDEX
 
 
 def _seconds(count: int, base: Fraction) -> float:
