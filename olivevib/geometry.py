@@ -183,8 +183,28 @@ def rotation_from_vector(vector: ArrayLike) -> Floats:
 
 
 def vector_from_rotation(R: ArrayLike) -> Floats:
-    """Rotation vector (3,) of a rotation matrix (3, 3), rad."""
-    return np.asarray(cv2.Rodrigues(np.asarray(R, dtype=np.float64))[0], dtype=np.float64).ravel()
+    """Rotation vector (3,), at most pi long, of a rotation matrix (3, 3), rad.
+
+    Through the quaternion's largest component, so tiny turns keep all their digits (cv2.Rodrigues
+    returns zero below 1e-5 rad). Source: Shepperd, J. Guidance and Control 1978.
+    """
+    m = np.asarray(R, dtype=np.float64)
+    d = np.diag(m)
+    off = np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
+    choice = int(np.argmax([m.trace(), *d]))
+    if choice == 0:
+        q = np.array([1 + m.trace(), *off])
+    else:
+        i = choice - 1
+        q = np.empty(4)
+        q[0] = off[i]
+        q[1:] = m[i] + m[:, i]
+        q[1 + i] = 1 + 2 * d[i] - m.trace()
+    q = q / np.linalg.norm(q) * (1.0 if q[0] >= 0 else -1.0)
+    sine = float(np.linalg.norm(q[1:]))
+    angle = 2 * np.arctan2(sine, q[0])
+    out: Floats = q[1:] * (angle / sine if sine > 0 else 2.0)
+    return out
 
 
 def skew(v: ArrayLike) -> Floats:

@@ -13,6 +13,7 @@ import numpy as np
 from olivevib.arrays import Bools, Floats
 from olivevib.calibration.assemble import BoardShape, flatten
 from olivevib.calibration.bundle import LEFT, THETA, Observations, State, linearise
+from olivevib.calibration.settings import LensPrior
 from olivevib.calibration.solve import Prior, Problem, Solution, cost, grams, reduce, solve, step
 from olivevib.calibration.views import BoardView
 from olivevib.geometry import CameraModel, homography, nearest_rotation
@@ -21,21 +22,6 @@ FOCAL_STARTS = (0.65, 0.5, 0.9, 1.3)  # of the image width; webcams lie between
 START_VIEWS = 15  # views used to choose among the starts
 LENS_FREE = np.arange(len(THETA)) < 6
 EFFICIENCY = 2 * (1 - np.exp(-2.0))  # E min(e^2, k^2) of a 2-D normal norm e at k = 2
-
-
-@dataclass(frozen=True)
-class LensPrior:
-    """Weak knowledge of a webcam's lens (knowledge: priors that were essential).
-
-    aspect_sd: beta/alpha = 1 +- this; centre_sd: of the width, about the image centre;
-    distortion_sd of k1, k2; bow_sd_mm at half the board's width; known: an earlier calibration of
-    this camera, whose covariance enters with its focal length widened by 0.5 %.
-    """
-
-    aspect_sd: float = 0.005
-    centre_sd: float = 0.02
-    distortion_sd: float = 0.5
-    bow_sd_mm: float = 1.0
 
 
 def lens_prior(prior: LensPrior, size_px: tuple[int, int], known: CameraModel | None) -> tuple[Floats, Floats]:

@@ -63,4 +63,3 @@ def _explain(error: Exception, console: Console) -> int:
         "Run the same command with --debug and send what it prints to the authors.",
     )
     return FAILED
-

@@ -8,7 +8,7 @@ from olivevib.errors import UsageError
 
 
 def id_list(text: str | None) -> tuple[int, ...]:
-    """"1,2,5-9" to ids; empty for None. UsageError for anything else."""
+    """Ids of "1,2,5-9"; empty for None. UsageError for anything else."""
     ids: list[int] = []
     for part in (text or "").split(","):
         first, _, last = part.strip().partition("-")
@@ -21,7 +21,7 @@ def id_list(text: str | None) -> tuple[int, ...]:
 
 
 def band(text: str | None) -> tuple[float, float] | None:
-    """"5-45" to (5.0, 45.0) Hz; None for None. UsageError for anything else."""
+    """The limits (5.0, 45.0) Hz of "5-45"; None for None. UsageError for anything else."""
     if text is None:
         return None
     low, _, high = text.partition("-")
@@ -35,7 +35,7 @@ def band(text: str | None) -> tuple[float, float] | None:
 
 
 def row_times(text: str | None) -> tuple[float | None, float | None]:
-    """"27.8" or "27.8,-27.8" to the row times of left and right, µs; UsageError otherwise."""
+    """Row times of left and right, µs, of "27.8" or "27.8,-27.8"; UsageError otherwise."""
     if text is None:
         return None, None
     try:
@@ -58,9 +58,7 @@ def settings(pairs: list[str]) -> dict[str, Any]:
     for pair in pairs:
         key, equals, text = pair.partition("=")
         if not equals or "." not in key:
-            raise UsageError(
-                f"--set {pair!r} is no setting.", "", "Write it as detection.fill=0.7"
-            )
+            raise UsageError(f"--set {pair!r} is no setting.", "", "Write it as detection.fill=0.7")
         try:
             out[key.strip()] = tomlkit.parse(f"v = {text}")["v"]
         except TOMLKitError:

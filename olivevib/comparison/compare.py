@@ -26,6 +26,8 @@ _RESEMBLES = 0.8  # correlation below which the two motions are not called the s
 _CLOSE = 0.05  # a rival lag whose correlation comes that near is told
 _DECISIVE = 25.0  # chi-square by which the best lag must beat the rival to be sure
 _OPEN_DEG = 20.0
+_LEAST_LEFT = 0.03  # of the motion's power that taking out the slow part must leave
+_NO_COLUMNS = Nuisance(np.empty((0, 0)))
 
 
 def compare(
@@ -80,14 +82,31 @@ class _Work:
     def rate_hz(self) -> float:
         return 1.0 / float(np.median(np.diff(self.camera_s)))
 
-    @property
-    def slow_hz(self) -> float:
-        """Width of the slow part: 1.5 corners, less where the line itself is seen that slow."""
+    def slow_hz(self, offset_s: float) -> float:
+        """Width of the slow part: 1.5 corners, unless that would take the motion itself.
+
+        A line next to a multiple of the frame rate is seen slow. Its start-up still tells the
+        clocks apart; only where next to nothing would be left is the slow part narrowed.
+        """
         wide = 1.5 * self.settings.corner_hz
         if self.lines.fit is None:
             return wide
         seen = fold(float(self.lines.fit.f_hz[0]), self.rate_hz)
-        return min(wide, max(_NARROWEST_HZ, 0.6 * seen))
+        narrow = max(_NARROWEST_HZ, 0.6 * seen)
+        if narrow >= wide or self._left(offset_s, wide) > _LEAST_LEFT:
+            return wide
+        return narrow
+
+    def _left(self, offset_s: float, limit_hz: float) -> float:
+        """Share of the predicted motion's power that survives taking out the slow part."""
+        good = self.motion.usable(self.camera_s + offset_s, self.settings.exposure_s)
+        t_s = self.camera_s[good]
+        if t_s.size < _FEWEST:
+            return 0.0
+        seen = self.motion.seen(t_s + offset_s, self.settings.exposure_s)
+        kept = nuisance(t_s, limit_hz).out(seen)
+        total = float(np.sum((seen - seen.mean(axis=0)) ** 2))
+        return float(np.sum(kept**2)) / total if total > 0 else 0.0
 
     @property
     def apart_s(self) -> float:
@@ -97,21 +116,16 @@ class _Work:
     def coarse(self, limits: tuple[float, float]) -> CoarseLag:
         """The best lag: envelopes where they are lively, else about the expected offset."""
         s = self.settings
-        middle = envelope_offset(self.camera_s, self.camera_mm, self.motion, limits, self.slow_hz)
+        wide = 1.5 * s.corner_hz
+        middle = envelope_offset(self.camera_s, self.camera_mm, self.motion, limits, wide)
+        level = middle is None
         if middle is None:
             middle = float(np.clip(s.expected_offset_s, *limits))
         half = int(np.ceil(s.fine_half_s / s.fine_step_s))
         offsets = np.asarray(middle + np.arange(-half, half + 1) * s.fine_step_s, np.float64)
-        slow = nuisance(self.camera_s, self.slow_hz)
-        return fine_lag(
-            self.camera_s,
-            slow.out(self.camera_mm),
-            self.motion,
-            slow,
-            offsets,
-            self.apart_s,
-            s.exposure_s,
-        )
+        slow = nuisance(self.camera_s, self.slow_hz(middle))
+        seen = Seen(self.camera_s, slow.out(self.camera_mm), slow, s.exposure_s)
+        return fine_lag(seen, self.motion, offsets, self.apart_s, level)
 
     def refined(self, offset_s: float) -> tuple[Seen, ClockFit]:
         """Gauss-Newton from a coarse lag, on the frames that the sensor covers."""
@@ -119,7 +133,7 @@ class _Work:
         q = self.camera_s + offset_s
         good = self.motion.usable(q, self.settings.exposure_s + margin)
         t_s = self.camera_s[good]
-        slow = nuisance(t_s, self.slow_hz) if t_s.size > 1 else Nuisance(np.ones((t_s.size, 1)))
+        slow = nuisance(t_s, self.slow_hz(offset_s)) if t_s.size > 1 else _NO_COLUMNS
         seen = Seen(t_s, slow.out(self.camera_mm[good]), slow, self.settings.exposure_s)
         if t_s.size < _FEWEST:
             return seen, _no_clock()
@@ -185,23 +199,29 @@ class _Outcome:
 
 @dataclass(frozen=True)
 class _Rival:
-    """The best other lag: whether it is near enough to tell, and whether it is excluded."""
+    """The best other lag: whether it is near enough to tell, and whether it is excluded.
+
+    scatter_s: how far apart the lags lie that fit alike; NaN where they go on without end.
+    """
 
     near: bool
     excluded: bool
     distance_s: float
+    scatter_s: float
 
 
 def _rival(work: _Work, lag: CoarseLag, clock: ClockFit) -> _Rival:
     if not np.isfinite(lag.rival_s) or lag.peak - lag.second_peak >= _CLOSE:
-        return _Rival(False, True, 0.0)
-    _, other = work.refined(lag.rival_s)
+        return _Rival(False, True, 0.0, 0.0)
+    seen, other = work.refined(lag.rival_s)
+    distance = abs(lag.rival_s - lag.offset_s)
     noise = np.maximum(clock.noise_mm, 1e-12)
-    if not np.isfinite(other.gain):
-        return _Rival(True, False, abs(lag.rival_s - lag.offset_s))
-    now, then = (np.sum((c.residual_mm / noise) ** 2) for c in (clock, other))
-    excluded = bool(then - now > _DECISIVE)
-    return _Rival(True, excluded, abs(other.offset_s - clock.offset_s))
+    excluded = False
+    if np.isfinite(other.gain) and seen.t_s.size == clock.residual_mm.shape[0]:
+        now, then = (np.sum((c.residual_mm / noise) ** 2) for c in (clock, other))
+        excluded = bool(then - now > _DECISIVE)
+        distance = abs(other.offset_s - clock.offset_s)
+    return _Rival(True, excluded, distance, np.nan if lag.level else max(distance, lag.scatter_s))
 
 
 def _comparison(
@@ -214,7 +234,7 @@ def _comparison(
 ) -> Comparison:
     rival = _rival(work, lag, clock)
     sigma = clock.sigma
-    offset_sigma = float(np.hypot(sigma[0], 0.0 if rival.excluded else rival.distance_s))
+    offset_sigma = float(np.hypot(sigma[0], 0.0 if rival.excluded else rival.scatter_s))
     worst_deg = float(np.degrees(clock.turn_sigma_rad))
     angle = float(np.degrees(np.linalg.norm(vector_from_rotation(clock.R_camera_sensor))))
     coherence = _coherence(seen.mm, clock.residual_mm)
@@ -279,7 +299,8 @@ def _remarks(work: _Work, rival: _Rival, clock: ClockFit, worst_deg: float) -> l
     if rival.near and not rival.excluded:
         out.append(
             f"The lag is ambiguous: {1e3 * rival.distance_s:.1f} ms away the two fit as well "
-            "(a steady motion repeats itself). Let both record the start of the machine."
+            "(a steady motion repeats itself, and half a period is half a turn). Let both record "
+            "the start of the machine."
         )
     elif rival.near:
         out.append(

@@ -7,23 +7,31 @@ from dataclasses import dataclass
 import numpy as np
 
 from olivevib.arrays import Floats
-from olivevib.comparison.forward import Nuisance, SensorMotion, nuisance
+from olivevib.comparison.fit import Seen
+from olivevib.comparison.forward import SensorMotion, nuisance
 from olivevib.comparison.settings import ComparisonSettings
 
 _ENVELOPE_HOP_S = 0.02
 _ENVELOPE_WINDOW_S = 0.25
 _LIVELY = 0.15  # spread of an envelope, of its mean, from which it can tell a lag
 _CHUNK = 64
+_ALIKE = 0.005  # of correlation
 
 
 @dataclass(frozen=True)
 class CoarseLag:
-    """The best lag, how well both motions correlate there, and the best rival lag."""
+    """The best lag, how well both motions correlate there, and the best rival lag.
+
+    scatter_s: rms distance of the lags that do as well as the rival; level: no envelope placed
+    the search, so that lags outside it may do as well.
+    """
 
     offset_s: float
     peak: float
     rival_s: float
     second_peak: float
+    scatter_s: float
+    level: bool
 
 
 def offsets_that_overlap(
@@ -92,42 +100,43 @@ def _correlation(optical: Floats, sensor: Floats, lag: int) -> float:
 
 
 def fine_lag(
-    camera_s: Floats,
-    camera_mm: Floats,
-    motion: SensorMotion,
-    slow: Nuisance,
-    offsets_s: Floats,
-    apart_s: float,
-    exposure_s: float,
+    seen: Seen, motion: SensorMotion, offsets_s: Floats, apart_s: float, level: bool
 ) -> CoarseLag:
     """Correlation over a fine grid of offsets, the sensor turned as suits each best.
 
-    camera_mm (N, 3) without its slow part. The rival is the best local maximum at least apart_s
-    away: with the sensor free to turn, a half-period slip of a single tone shows itself here.
+    The rival is the best lag at least apart_s away: with the sensor free to turn, a half-period
+    slip of a single tone shows itself here. level: the envelopes could not place the grid.
     """
     worth = np.concatenate(
         [
-            turned_correlation(camera_mm, slow.out(_seen(motion, camera_s, chunk, exposure_s)))
+            turned_correlation(seen.mm, seen.slow.out(_seen(motion, seen, chunk)))
             for chunk in np.array_split(offsets_s, max(1, offsets_s.size // _CHUNK))
         ]
     )
     best = int(np.argmax(worth))
-    far = np.abs(offsets_s - offsets_s[best]) >= apart_s
+    away = offsets_s - offsets_s[best]
+    far = np.abs(away) >= apart_s
     if not far.any():
-        return CoarseLag(float(offsets_s[best]), float(worth[best]), np.nan, 0.0)
+        return CoarseLag(float(offsets_s[best]), float(worth[best]), np.nan, 0.0, 0.0, level)
     rival = int(np.flatnonzero(far)[np.argmax(worth[far])])
+    alike = away[worth > worth[rival] - _ALIKE]
     return CoarseLag(
-        float(offsets_s[best]), float(worth[best]), float(offsets_s[rival]), float(worth[rival])
+        offset_s=float(offsets_s[best]),
+        peak=float(worth[best]),
+        rival_s=float(offsets_s[rival]),
+        second_peak=float(worth[rival]),
+        scatter_s=float(np.sqrt(np.mean(alike**2))),
+        level=level,
     )
 
 
-def _seen(motion: SensorMotion, camera_s: Floats, offsets_s: Floats, exposure_s: float) -> Floats:
+def _seen(motion: SensorMotion, seen: Seen, offsets_s: Floats) -> Floats:
     """(L, N, 3) prediction at each offset; 0 where the sensor does not reach."""
-    q = offsets_s[:, None] + camera_s
+    q, exposure_s = offsets_s[:, None] + seen.t_s, seen.exposure_s
     inside = motion.usable(q.ravel(), exposure_s).reshape(q.shape)
     clipped = np.clip(q, motion.start_s + exposure_s, motion.end_s - exposure_s)
-    seen = motion.seen(clipped.ravel(), exposure_s).reshape(*q.shape, 3)
-    return np.asarray(np.where(inside[..., None], seen, 0.0))
+    mm = motion.seen(clipped.ravel(), exposure_s).reshape(*q.shape, 3)
+    return np.asarray(np.where(inside[..., None], mm, 0.0))
 
 
 def turned_correlation(camera_mm: Floats, predicted_mm: Floats) -> Floats:

@@ -18,6 +18,7 @@ STEP_PX = 0.25  # distance of samples on a scan line
 CORRELATION = 2.0  # scan lines 1 px apart share pixels: their errors count about half
 TUKEY = 4.685  # robust tuning constant, 95 % efficiency
 NOISE_FLOOR_PX = 0.02  # smallest believed scatter of an edge point (8-bit rounding, texture)
+ROUGH_PX = 0.4  # an edge whose points scatter more is covered or not straight
 CROWDED_PX = 3.5  # below this module width neighbouring edges pull: a bias sigma is added
 CROWDED_SIGMA = 0.06  # px of bias sigma per px of missing module width (rendered scenes)
 
@@ -83,7 +84,8 @@ def _side(grey: Grey, start: Floats, end: Floats, far: Floats, modules: int) -> 
     half = 0.5 * length - max(1.5, 0.08 * length)
     t = np.linspace(-half, half, max(6, int(2 * half) + 1))
     base = (start + end) / 2
-    first = _offsets(grey, base[None] + t[:, None] * along, normal, reach)
+    wide = float(np.clip(0.7 * module, reach, 4.0))  # the start may be off by a pixel or two
+    first = _offsets(grey, base[None] + t[:, None] * along, normal, wide)
     line = _line(t, first) if first is not None else None
     if line is None:
         return None
@@ -92,7 +94,7 @@ def _side(grey: Grey, start: Floats, end: Floats, far: Floats, modules: int) -> 
     turned = np.array([along + b * normal, normal - b * along]) / np.hypot(1.0, b)
     again = _offsets(grey, moved[None] + t[:, None] * turned[0], turned[1], reach)
     line = _line(t, again) if again is not None else None
-    if line is None:
+    if line is None or line[3] > ROUGH_PX:
         return None
     a, b, covariance, rms = line
     covariance[0, 0] += (CROWDED_SIGMA * max(0.0, CROWDED_PX - module)) ** 2

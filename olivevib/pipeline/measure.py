@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from olivevib.comparison import Comparison, compare as compare_records
-from olivevib.errors import Caution, InputError
 from olivevib.files.store import write_stage
+
+from olivevib.errors import Caution, InputError
 from olivevib.geometry import StereoRig
 from olivevib.pipeline.libraries import corners_mm, trial_library
 from olivevib.progress import Tick, silent

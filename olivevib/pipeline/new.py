@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import tomlkit
+from olivevib.files.stamps import pick_camera
+from olivevib.files.stills import IMAGE_SUFFIXES
 from tomlkit.items import Table
 
 from olivevib.calibration.boards import parse_board
 from olivevib.errors import InputError, UsageError
 from olivevib.files.atomic import as_input_error
-from olivevib.files.stamps import pick_camera
-from olivevib.files.stills import IMAGE_SUFFIXES
 from olivevib.files.video import Video
 from olivevib.marker import load_library
 from olivevib.pipeline.libraries import only_known
@@ -140,7 +140,8 @@ def _check_calibration_size(plan: NewTrial, side: str, size: tuple[int, int]) ->
     other = _size(Path(calibration))
     if other != size:
         raise InputError(
-            f"the {side} calibration is {other[0]} x {other[1]} px, the trial {size[0]} x {size[1]}.",
+            f"the {side} calibration is {other[0]} x {other[1]} px, "
+            f"the trial {size[0]} x {size[1]} px.",
             "A calibration holds for one mode of the camera only.",
             "Record the board in the same mode as the trial, neither cropped, turned nor scaled.",
         )
@@ -261,9 +262,7 @@ def _calibration(plan: NewTrial, places: _Places) -> Table | None:
         return _table({"rig": places.get(plan.rig)})
     if not plan.calibration_left:
         return None
-    same = {
-        side: getattr(plan, f"calibration_{side}") == getattr(plan, side) for side in SIDES
-    }
+    same = {side: getattr(plan, f"calibration_{side}") == getattr(plan, side) for side in SIDES}
     return _table(
         {
             "left": places.get(plan.calibration_left),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from olivevib.files.journal import Journal
@@ -42,11 +43,11 @@ def track(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     key = hashlib.sha256(now.canonical().encode()).hexdigest()
     journal = Journal.open(trial.folder / PRIVATE / "track.journal", key)
     try:
-        _measure(trial, library, infos, journal, tick)
+        notes = _measure(trial, library, infos, journal, tick)
         seen = {side: [unpack(row) for row in _payloads(journal, side)] for side in SIDES}
     finally:
         journal.close()
-    stored = stored_tracks(trial, library, infos, seen)
+    stored = stored_tracks(trial, library, infos, seen, notes)
     write_stage(trial.folder / "tracks.h5", tracks_file(stored, now))
     journal.remove()
     return stored.cautions
@@ -67,17 +68,18 @@ def _measure(
     infos: dict[str, VideoInfo],
     journal: Journal,
     tick: Tick,
-) -> None:
-    """Bring the journal to the end of both videos."""
+) -> tuple[Caution, ...]:
+    """Bring the journal to the end of both videos; what is wrong with the files comes back."""
     done, waiting = 0, 0
     makers = {}
+    notes: dict[str, tuple[Caution, ...]] = dict.fromkeys(SIDES, ())
     for side in SIDES:
         last = journal.last(side)
         start, memory = (0, None) if last is None else (last[0] + 1, last[1])
         done += start
         path = trial.path(getattr(trial.settings.cameras, side).video)
         tracker = _tracker(library, trial.settings.detection, memory)
-        makers[side] = lambda path=path, start=start, tracker=tracker: _steps(path, start, tracker)
+        makers[side] = partial(_steps, path, start, tracker, partial(notes.__setitem__, side))
 
     def collect(side: str, step: _Step) -> None:
         nonlocal waiting
@@ -93,6 +95,7 @@ def _measure(
         both(makers, collect, tick, total, "tracking markers", done)
     finally:
         journal.commit()
+    return tuple(note for side in SIDES for note in notes[side])
 
 
 def _tracker(library: MarkerLibrary, settings: DetectionSettings, memory: bytes | None) -> Tracker:
@@ -102,10 +105,13 @@ def _tracker(library: MarkerLibrary, settings: DetectionSettings, memory: bytes 
     return tracker
 
 
-def _steps(path: Path, start: int, tracker: Tracker) -> Iterator[_Step]:
+def _steps(
+    path: Path, start: int, tracker: Tracker, note: Callable[[tuple[Caution, ...]], None]
+) -> Iterator[_Step]:
     with Video.open(path) as video:
         for frame in video.frames(start):
             yield _Step(frame.index, pack(_observe(frame, tracker)), tracker.memory())
+        note(tuple(video.cautions))
 
 
 def _observe(frame: Frame, tracker: Tracker) -> FrameObservations:

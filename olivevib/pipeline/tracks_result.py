@@ -48,8 +48,12 @@ def stored_tracks(
     library: MarkerLibrary,
     infos: dict[str, VideoInfo],
     seen: dict[str, list[FrameObservations]],
+    notes: tuple[Caution, ...] = (),
 ) -> StoredTracks:
-    """Tracks of both cameras on their own clocks, with the record of each recording."""
+    """Tracks of both cameras on their own clocks, with the record of each recording.
+
+    notes: what reading the files had to say.
+    """
     recorded = {side: _recorded(trial, side, infos[side], seen[side]) for side in SIDES}
     declared = tuple(int(i) for i in library.ids) if trial.settings.markers.ids else None
     ids, strays = _markers(list(recorded.values()), declared)
@@ -65,7 +69,7 @@ def stored_tracks(
         stamp_s={side: _with_drops(recorded[side]) for side in SIDES},
         stray_ids=strays,
         localiser=", ".join(localisers),
-        cautions=counts + _cautions(list(recorded.values()), ids, declared),
+        cautions=notes + counts + _cautions(list(recorded.values()), ids, declared),
     )
 
 
@@ -139,15 +143,7 @@ def _with_drops(camera: _Recorded) -> Floats:
 def _cautions(
     cameras: list[_Recorded], ids: tuple[int, ...], declared: tuple[int, ...] | None
 ) -> tuple[Caution, ...]:
-    out = [
-        Caution(
-            "damaged-frames",
-            f"{len(camera.damaged)} frames of the {camera.side} video cannot be decoded.",
-            "They count as not seen; copy the file again from the camera if you can.",
-        )
-        for camera in cameras
-        if camera.damaged
-    ]
+    out = []
     counts = [camera.counts() for camera in cameras]
     if not any(counts):
         out.append(

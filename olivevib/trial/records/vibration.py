@@ -176,5 +176,3 @@ def _candidates(
         )
         for k, f in enumerate(f_hz)
     )
-
-
