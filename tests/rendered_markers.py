@@ -34,7 +34,7 @@ class Canvas:
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
 
     def __post_init__(self) -> None:
-        self.light = np.full((self.height, self.width), self.look.ground)
+        self.light = np.full((self.height, self.width), float(self.look.ground))
 
     def add(self, pattern: np.ndarray, H: np.ndarray, quiet: float = 2.0) -> None:
         """Draw a dark pattern (n, n) with its white card through H (centred modules to px)."""

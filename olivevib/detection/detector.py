@@ -7,6 +7,7 @@ from collections.abc import Callable
 from olivevib.arrays import Grey
 from olivevib.detection.detection import Detection, Reader
 from olivevib.detection.foreign import ForeignReader
+from olivevib.detection.paper import PaperReader
 from olivevib.detection.settings import DetectionSettings
 from olivevib.marker import MarkerLibrary
 
@@ -35,6 +36,7 @@ def _foreign(library: MarkerLibrary, settings: DetectionSettings) -> Reader:
 
 
 _READERS: dict[str, Callable[[MarkerLibrary, DetectionSettings], Reader]] = {
+    "olive": PaperReader,
     "aruco": _foreign,
     "apriltag": _foreign,
 }
