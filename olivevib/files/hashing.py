@@ -83,8 +83,9 @@ class HashCache:
         self._known = {file: self._known[file] for file in keep}
         data = {file: [*entry[0], entry[1]] for file, entry in self._known.items()}
         try:
+            self.path.parent.mkdir(exist_ok=True)
             write_text_atomic(self.path, json.dumps(data, indent=0) + "\n")
-        except InputError:
+        except (InputError, OSError):
             return  # a cache that cannot be written costs time, never the measurement
 
 
