@@ -42,8 +42,8 @@ def same_count(track: Track, frames: Ints) -> View:
 def at_times(track: Track, track_t_s: Floats, t_s: Floats) -> View:
     """The marker at the times ``t_s`` (N,), between this camera's observations at track_t_s.
 
-    Cubic through four neighbours where all are there, else linear through two; nothing across a
-    gap. A motion above half the frame rate is not followed by any interpolation: who calls must
+    Cubic through four neighbours (one-sided at the ends), linear through two beside a gap, nothing
+    across one. A motion above half the frame rate is not followed by any interpolation: who calls must
     know the band. Covariances are those of independent neighbours.
     """
     seen = np.flatnonzero(np.isfinite(track.centre_px[:, 0]))
@@ -79,10 +79,9 @@ def _neighbours(
     a, b = after - 1, after
     if not times[a] < t < times[b] or times[b] - times[a] > gap:
         return None
-    outer = a >= 1 and b + 1 < times.size
-    if outer and times[a] - times[a - 1] <= gap and times[b + 1] - times[b] <= gap:
-        rows = [a - 1, a, b, b + 1]
-    else:
+    first = min(max(a - 1, 0), max(times.size - 4, 0))
+    rows = list(range(first, min(first + 4, times.size)))
+    if np.diff(times[rows]).max() > gap:
         rows = [a, b]
     nodes = times[rows]
     weights = [

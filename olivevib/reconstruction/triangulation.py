@@ -31,12 +31,13 @@ class Points:
 def linear_eigen(rig: StereoRig, left_px: Floats, right_px: Floats) -> Floats:
     """Points (N, 3) mm by the homogeneous DLT, smallest singular vector (paper, section 5).
 
-    Distortion is removed first. Degenerates for parallel rays (points far beyond the baseline).
+    Distortion is removed first, and lengths are taken in baselines, without which the four columns
+    differ a thousandfold. Degenerates for parallel rays (points far beyond the baseline).
     Source: Hartley and Sturm, Triangulation, CVIU 1997, "Linear-Eigen".
     """
     left, right = rig.left.ray(left_px), rig.right.ray(right_px)
     P_left = np.eye(3, 4)
-    P_right = np.column_stack([rig.R_right_left, rig.t_right_left_mm])
+    P_right = np.column_stack([rig.R_right_left, rig.t_right_left_mm / rig.baseline_mm])
     good = np.isfinite(left[:, 0]) & np.isfinite(right[:, 0])
     out = np.full((len(left), 3), np.nan)
     if good.any():
@@ -48,9 +49,8 @@ def linear_eigen(rig: StereoRig, left_px: Floats, right_px: Floats) -> Floats:
             ],
             axis=1,
         )
-        A = A / np.linalg.norm(A, axis=2, keepdims=True)
         X = np.linalg.svd(A)[2][:, -1]
-        out[good] = X[:, :3] / X[:, 3:]
+        out[good] = X[:, :3] / X[:, 3:] * rig.baseline_mm
     return out
 
 
