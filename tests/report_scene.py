@@ -120,7 +120,7 @@ def line(status: LineStatus, f_hz: float, m: int = 0, unit: str = "mm") -> Line:
         candidates_hz=(f_hz, 30 - f_hz, 30 + f_hz) if open_status else (),
         amplitude=amplitude,
         amplitude_sigma=amplitude * 0.004,
-        phase_rad=np.array([0.0, 0.7, 1.4]),
+        phase_rad=np.array([0.0, 0.7, 1.4]) + 0.4 * m + 2 * np.pi * f_hz * 5.0,
         t_ref_s=5.0,
         unit=unit,
         harmonics=np.full((1, 3), 0.05),
@@ -145,6 +145,15 @@ def spectrum(path: Trajectory, statuses: list[LineStatus], f_hz: float = 12.003)
     )  # fmt: skip
 
 
+def recording(side: str) -> dict[str, Any]:
+    """What the stored recording of one camera says of itself."""
+    return {
+        "video": f"{side}.mkv", "codec": "mjpeg", "frames": 300, "dropped": 1, "damaged": 2,
+        "stamp_kind": "container", "rate_hz": 29.9987, "rate_sigma_hz": 4e-4, "jitter_s": 3.1e-4,
+        "worst_s": 1.2e-3,
+    }  # fmt: skip
+
+
 def vibration(path: Trajectory, spectra: Spectrum) -> Vibration:
     """Phases of a shaken trial and the figures of every marker in the steady one."""
     end = float(path.t_s[-1])
@@ -161,7 +170,8 @@ def vibration(path: Trajectory, spectra: Spectrum) -> Vibration:
         candidates = tuple(
             CandidateMotion(
                 f, each.amplitude, each.amplitude * 6.28 * f,
-                each.amplitude * (6.28 * f) ** 2 / 1000, 1.0,
+                each.amplitude * (6.28 * f) ** 2 / 1000,
+                float(np.linalg.norm(each.amplitude)) * (6.28 * f) ** 2 / 1414,
             )
             for f in each.candidates_hz
         )  # fmt: skip
@@ -271,6 +281,8 @@ def content(
         "rig": rig(),
         "calibration": calibration_view(),
         "tracks": tracks(path),
+        "recordings": {side: recording(side) for side in ("left", "right")},
+        "clock_source": "calibration",
         "trajectory": path,
         "vibration": vibration(path, spectra),
         "comparison": comparison(),

@@ -48,7 +48,9 @@ class ReportContent:
 
     record: sections of trial.toml (session, tree, machine, markers, …) as plain values. summary:
     the content of ``show --json``. places: words for each marker id. provenance: versions,
-    settings and hashes as plain text, ``command`` among them.
+    settings and hashes as plain text, ``command`` among them. recordings: for left and right what
+    the stored recording says of itself (rate, jitter, drops). clock_source: where the offset
+    between the cameras comes from.
     """
 
     name: str
@@ -59,6 +61,8 @@ class ReportContent:
     rig: StereoRig | None = None
     calibration: CalibrationView | None = None
     tracks: tuple[Track, ...] = ()
+    recordings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    clock_source: str = ""
     trajectory: Trajectory | None = None
     vibration: Vibration | None = None
     comparison: Comparison | None = None

@@ -11,6 +11,7 @@ from olivevib.progress import Tick, silent
 from olivevib.report import tables
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
+from olivevib.report.figures import pair_distances
 from olivevib.report.plates import Plate, plates
 from olivevib.report.verdict import MEANING, verdict
 from olivevib.signals import State
@@ -23,6 +24,8 @@ class Section:
     name: str
     title: str
 
+
+MOST_PAIRS = 66  # distances listed as a table: 12 markers
 
 SECTIONS = (
     Section("markers", "Markers"),
@@ -77,6 +80,9 @@ def render_page(content: ReportContent, tick: Tick = silent) -> str:
         cameras=tables.camera_columns(content),
         calibration_verdict=clean(content.calibration.verdict) if content.calibration else "",
         timing=tables.timing_pairs(content),
+        clocks=tables.camera_clocks(content),
+        phase_rows=tables.phase_rows(content),
+        distances=_distances(content),
         states=[s.word for s in State],
         state_rows=tables.state_rows(content),
         comparison=tables.comparison_pairs(content),
@@ -102,6 +108,12 @@ def _heading(content: ReportContent) -> list[str]:
         if value not in (None, ""):
             out.append(f"tree {clean(value, 60)}" if key == "id" else clean(value, 60))
     return out
+
+
+def _distances(content: ReportContent) -> list[tuple[str, str, str]]:
+    """The table of distances, where it is short enough to be read."""
+    pairs = pair_distances(content.trajectory) if content.trajectory is not None else []
+    return tables.distance_rows(pairs) if len(pairs) <= MOST_PAIRS else []
 
 
 def _reasons(content: ReportContent) -> list[tuple[str, str]]:

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from olivevib.arrays import Floats
 from olivevib.geometry import CameraModel
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
-from olivevib.report.words import NOT_KNOWN, fact, known, measure, number, percent, seconds
+from olivevib.report.figures import Distance, describe
+from olivevib.report.words import NOT_KNOWN, fact, known, measure, number, percent, plain, seconds
 from olivevib.signals import State, fit_stamps
-from olivevib.vibration.types import Line, LineStatus
+from olivevib.vibration import Line
 
 Pair = tuple[str, str]  # label, value with unit
 
@@ -28,27 +28,32 @@ class MarkerRow:
     seen: str
     frequency: str
     status: str
-    candidates: str
+    candidates: tuple[str, ...]
     amplitude: tuple[str, str, str]
     acceleration: tuple[str, ...]
     displacement: str
 
 
-def candidate_accelerations(line: Line) -> list[tuple[float, float, float]]:
-    """(f, rms, sigma) of the acceleration that each candidate means: (2 pi f)² A / sqrt 2, m/s².
+def candidate_accelerations(
+    content: ReportContent, marker_id: int
+) -> list[tuple[float, float, float]]:
+    """(f, rms, sigma) of the acceleration that each candidate frequency would mean, m/s².
 
-    A is the resultant of the three peak amplitudes, so this is the total rms of the three axes;
-    its relative variance is that of A plus (2 sigma_f / f)².
+    The rms is that of the analysis (three axes together); its relative variance is that of the
+    amplitude plus (2 sigma_f / f)².
     """
-    size = float(np.linalg.norm(line.amplitude))
-    if not np.isfinite(size) or size == 0 or line.unit != "mm":
+    row = None if content.vibration is None else content.vibration.row(marker_id)
+    if row is None:
         return []
-    of_size = float(np.linalg.norm(line.amplitude * line.amplitude_sigma)) / size**2
+    line = row.line
+    size = float(np.linalg.norm(line.amplitude))
+    of_size = float(np.linalg.norm(line.amplitude * line.amplitude_sigma)) / max(size, 1e-12) ** 2
     out = []
-    for f in line.candidates_hz or (line.f_hz,):
-        rms = (2 * np.pi * f) ** 2 * size / np.sqrt(2) / 1000
-        relative = np.hypot(of_size, 2 * line.f_sigma_hz / f)
-        out.append((float(f), float(rms), float(rms * relative)))
+    for each in row.candidates:
+        relative = float(np.hypot(of_size, 2 * line.f_sigma_hz / each.f_hz))
+        rms = each.acceleration_rms_m_s2
+        if np.isfinite(rms):
+            out.append((each.f_hz, rms, rms * relative))
     return out
 
 
@@ -60,7 +65,7 @@ def marker_rows(content: ReportContent) -> list[MarkerRow]:
         marker_id = int(marker["id"])
         line = lines.get(marker_id)
         sizes, sigmas = marker.get("amplitude_mm") or {}, marker.get("amplitude_sigma_mm") or {}
-        x, y, z = (measure(sizes.get(a), "mm", sigmas.get(a), digits=3) for a in "xyz")
+        x, y, z = (measure(sizes.get(a), "", sigmas.get(a), digits=3) for a in "xyz")
         listed = marker.get("frequency_candidates_hz") or []
         hz, sigma = marker.get("frequency_hz"), marker.get("frequency_sigma_hz")
         rows.append(
@@ -72,34 +77,45 @@ def marker_rows(content: ReportContent) -> list[MarkerRow]:
                 status=clean(marker.get("frequency_status") or NOT_KNOWN),
                 candidates=_candidates(listed, line),
                 amplitude=(x, y, z),
-                acceleration=_acceleration(marker, line),
-                displacement=measure(marker.get("displacement_pp_mm"), "mm", digits=3),
+                acceleration=_acceleration(content, marker),
+                displacement=measure(marker.get("displacement_pp_mm"), digits=3),
             )
         )
     return rows
 
 
-def _candidates(listed: Sequence[float], line: Line | None) -> str:
-    if not listed:
-        return ""
+def _candidates(listed: Sequence[float], line: Line | None) -> tuple[str, ...]:
     shares = line.probabilities if line is not None else ()
-    parts = [number(f) for f in listed]
-    if len(shares) == len(parts):
-        parts = [f"{f} ({share:.0%})" for f, share in zip(parts, shares, strict=True)]
-    return " or ".join(parts) + "\u00a0Hz"
+    if len(shares) == len(listed):
+        return tuple(
+            f"{plain(f, 2)} Hz ({share:.0%})" for f, share in zip(listed, shares, strict=True)
+        )
+    return tuple(f"{plain(f, 2)} Hz" for f in listed)
 
 
-def _acceleration(marker: Mapping[str, Any], line: Line | None) -> tuple[str, ...]:
+def _acceleration(content: ReportContent, marker: Mapping[str, Any]) -> tuple[str, ...]:
     value = marker.get("acceleration_rms_m_s2")
     if known(value):
-        return (measure(value, "m/s2", digits=3),)
-    open_ones = (LineStatus.AMBIGUOUS, LineStatus.ALIASED, LineStatus.SUPPORTED)
-    if line is None or line.status not in open_ones:
-        return (NOT_KNOWN,)
-    each = candidate_accelerations(line)
-    return tuple(f"{measure(a, 'm/s2', s)} if {number(f)}\u00a0Hz" for f, a, s in each) or (
-        NOT_KNOWN,
-    )
+        return (measure(value, digits=3),)
+    each = candidate_accelerations(content, int(marker["id"]))
+    listed = tuple(f"{measure(a, '', s)} if {plain(f, 2)} Hz" for f, a, s in each)
+    return listed or (NOT_KNOWN,)
+
+
+def phase_rows(content: ReportContent) -> list[tuple[str, ...]]:
+    """Marker × phase: displacement rms x y z and peak to peak, acceleration rms and 95 %, line."""
+    if content.vibration is None:
+        return []
+    out = []
+    for row in content.vibration.table:
+        d, a = row.displacement, row.acceleration
+        out.append((
+            content.marker_name(row.id), clean(row.phase, 30), str(row.samples),
+            *(measure(float(v), digits=3) for v in d.rms), measure(d.extent, digits=3),
+            measure(a.resultant_rms, digits=3), measure(a.resultant_p95, digits=3),
+            describe(row.line),
+        ))  # fmt: skip
+    return out
 
 
 def record_sections(content: ReportContent) -> list[tuple[str, list[Pair]]]:
@@ -185,32 +201,61 @@ def _camera(camera: CameraModel | None, summary: Mapping[str, Any]) -> list[Pair
 
 
 def timing_pairs(content: ReportContent) -> list[Pair]:
-    """The clock: frame rate as measured, offset of the right camera, row times and source."""
+    """The clock: frames of the trial, and what is added to the right camera's stamps."""
     timing = content.summary.get("timing") or {}
     offset, sigma = timing.get("right_offset_s"), timing.get("right_offset_sigma_s")
     row = timing.get("reference_row")
     at = "" if row is None else f", at raw row {number(float(row))}"
-    pairs = [*_rate(content), (f"to add to the right camera's stamps{at}", seconds(offset, sigma))]
-    for side in ("left", "right"):
-        camera = timing.get(side) or {}
-        source = clean(camera.get("source") or NOT_KNOWN)
-        value = seconds(camera.get("row_time_s"), camera.get("row_time_sigma_s"))
-        if source == "unknown":
-            value = "not known, taken as 0\u00a0s"
-        elif source == "global":
-            value = "0\u00a0s: all rows at once"
-        pairs.append((f"time from row to row, {side} camera", f"{value} (source: {source})"))
-    return pairs
+    source = content.clock_source
+    came = f" (source: {clean(source, 40)})" if source else ""
+    value = "not known, taken as 0\u00a0s" if source == "unknown" else seconds(offset, sigma) + came
+    return [*_rate(content), (f"to add to the right camera's stamps{at}", value)]
+
+
+def camera_clocks(content: ReportContent) -> list[tuple[str, str, str]]:
+    """Quantity, left, right: what each recording says of its own clock and read-out."""
+    columns = [_clock(content, side) for side in ("left", "right")]
+    return [(name, left, right) for (name, left), (_, right) in zip(*columns, strict=True)]
+
+
+def _clock(content: ReportContent, side: str) -> list[Pair]:
+    timing = (content.summary.get("timing") or {}).get(side) or {}
+    source = clean(timing.get("source") or NOT_KNOWN)
+    value = seconds(timing.get("row_time_s"), timing.get("row_time_sigma_s"))
+    if source == "unknown":
+        value = "not known, taken as 0\u00a0s"
+    elif source == "global":
+        value = "0\u00a0s: all rows at once"
+    pairs = [("time from row to row", value), ("its source", source)]
+    recording = content.recordings.get(side)
+    if recording is None:
+        return pairs
+    get = recording.get
+    return [
+        (
+            "recording",
+            f"{clean(get('video', NOT_KNOWN), 60)} ({clean(get('codec', NOT_KNOWN), 20)})",
+        ),
+        ("frame rate by the stamps", measure(get("rate_hz"), "frames/s", get("rate_sigma_hz"))),
+        ("stamps from", clean(get("stamp_kind") or NOT_KNOWN, 30)),
+        ("scatter of the stamps, rms", seconds(get("jitter_s"))),
+        ("largest distance from an even clock", seconds(get("worst_s"))),
+        (
+            "frames; dropped; damaged",
+            "; ".join(str(get(k)) for k in ("frames", "dropped", "damaged")),
+        ),
+        *pairs,
+    ]
 
 
 def _rate(content: ReportContent) -> list[Pair]:
     path = content.trajectory
     if path is None or path.t_s.size < 2:
-        return [("frame rate, measured", NOT_KNOWN)]
+        return [("frames in space", NOT_KNOWN)]
     clock = fit_stamps(path.t_s)
     return [
-        ("frame rate, measured", measure(clock.rate_hz, "frames/s", clock.rate_sigma_hz)),
-        ("frames, and missing between them", f"{path.t_s.size}, {clock.dropped.size}"),
+        ("frame rate on the trial clock", measure(clock.rate_hz, "frames/s", clock.rate_sigma_hz)),
+        ("frames; missing between them", f"{path.t_s.size}; {clock.dropped.size}"),
     ]
 
 
@@ -264,9 +309,12 @@ def comparison_lines(content: ReportContent) -> list[tuple[str, str, str, str, s
     return out
 
 
-def distance_rows(pairs: Sequence[tuple[str, Floats]]) -> list[Pair]:
-    """Mean and standard deviation of labelled distance series, mm."""
-    return [(name, measure(np.nanmean(v), "mm", np.nanstd(v, ddof=1))) for name, v in pairs]
+def distance_rows(pairs: Sequence[Distance]) -> list[tuple[str, str, str]]:
+    """Each pair of markers: mean distance with standard deviation, and in how many frames."""
+    return [
+        (f"{p.first} – {p.second}", measure(p.mean_mm, "mm", p.sd_mm), str(p.frames))
+        for p in pairs
+    ]  # fmt: skip
 
 
 def provenance_pairs(content: ReportContent) -> list[Pair]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from olivevib.comparison import Verdict
 from olivevib.report.content import ReportContent
 from olivevib.report.figures.spectra import describe
 from olivevib.report.tables import candidate_accelerations
-from olivevib.report.words import count, measure, number, percent, triple
+from olivevib.report.words import count, measure, number, percent, plain, triple
 from olivevib.vibration.types import Line, LineStatus
 
 MEANING: dict[LineStatus, str] = {
@@ -19,6 +20,14 @@ MEANING: dict[LineStatus, str] = {
     LineStatus.CHIRP: "the speed changes too fast to resolve a line",
     LineStatus.ALIASED: "peaks of samples only: each could be any of the candidates",
     LineStatus.NONE: "no line stands out of the noise",
+}
+
+AXES = "x\u00a0/\u00a0y\u00a0/\u00a0z"
+_AGREEMENT = {
+    Verdict.AGREES: "camera and accelerometer agree",
+    Verdict.DIFFERS: "camera and accelerometer differ",
+    Verdict.UNDECIDED: "whether camera and accelerometer agree is undecided",
+    Verdict.NO_OVERLAP: "camera and accelerometer recorded no common stretch of time",
 }
 
 
@@ -39,7 +48,7 @@ def _seen(content: ReportContent) -> str:
     return (
         f"{count(int(found.sum()), 'marker')} were located in space over {span}"
         f" ({count(path.t_s.size, 'frame')}); half of them in at least {percent(share)} of the"
-        f" frames, each position to {known} (x / y / z, one standard deviation)."
+        f" frames; a position is known to {known} ({AXES}, one standard deviation)."
     ).replace("1\u00a0marker were", "1\u00a0marker was")
 
 
@@ -66,13 +75,14 @@ def _vibration(content: ReportContent) -> str:
     size = measure(line.amplitude[axis], "mm", line.amplitude_sigma[axis])
     moves = f"by {size} (peak) along {'xyz'[axis]}"
     if line.status in (LineStatus.AMBIGUOUS, LineStatus.ALIASED) and line.candidates_hz:
-        either = " or ".join(number(f) for f in line.candidates_hz[:4])
-        rms = candidate_accelerations(line)[:4]
+        either = " or ".join(plain(f, 2) for f in line.candidates_hz[:4])
+        rms = candidate_accelerations(content, marker_id)[:4]
         shake = " or ".join(number(a, 3) for _, a, _ in rms)
         return (
             f"Marker {name} moves most, {moves}, but its frequency is {line.status}: {either} Hz"
-            f" all give these pictures, so its acceleration is {shake} m/s² rms; nothing here"
-            " decides which."
+            " all give these pictures"
+            + (f", so its acceleration is {shake} m/s² rms" if shake else "")
+            + "; nothing here decides which."
         )
     others = [other.status for i, other in content.lines().items() if i != marker_id]
     same = sum(status is line.status for status in others)
@@ -94,7 +104,7 @@ def _trust(content: ReportContent) -> str:
     if content.comparison is None:
         parts.append("there is no accelerometer to compare with")
     else:
-        parts.append(f"camera and accelerometer: {content.comparison.verdict}")
+        parts.append(_AGREEMENT[content.comparison.verdict])
     n = len(content.cautions)
     parts.append("no warning was raised" if n == 0 else f"{count(n, 'warning')} to read below")
     return "; ".join(parts) + "."

@@ -68,7 +68,9 @@ def measure(value: Any, unit: str = "", sigma: Any = None, digits: int = 4) -> s
     tail = (_GAP if unit and unit != "°" else "") + unit_text(unit)
     if not known(sigma) or sigma <= 0:
         return number(value, digits) + tail
-    decimals = min(9, decimals_of(sigma))
+    decimals = decimals_of(sigma)
+    if sigma < 1e-9 * abs(value):  # far below what a file keeps: an exact value
+        return number(value, 9).rstrip("0").rstrip(".") + tail
     both = f"{plain(value, decimals)} ± {plain(sigma, decimals)}".replace(" ", _GAP)
     return (f"({both})" if unit == "°" else both) + tail
 
@@ -117,9 +119,9 @@ def fact(key: str, value: Any) -> tuple[str, str]:
     if isinstance(value, bool):
         return words, "yes" if value else "no"
     if known(value):
-        return words, measure(value, unit, digits=6)
+        return words, f"{value:.6g}".replace("-", _MINUS) + (_GAP + unit if unit else "")
     if isinstance(value, list | tuple):
-        text = ", ".join(number(v, 6) if known(v) else clean(v) for v in value)
+        text = ", ".join(f"{v:.6g}" if known(v) else clean(v) for v in value)
         return words, clean(text) + (_GAP + unit if unit else "")
     return words, clean(value)
 

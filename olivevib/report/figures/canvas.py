@@ -199,7 +199,7 @@ def key(
         )
         figure.add_artist(line)
         figure.text((x_in + 0.36) / width, y, word, va="center", fontsize=7, color=QUIET)
-        x_in += 0.55 + 0.065 * len(word)
+        x_in += 0.6 + 0.056 * len(word)
 
 
 def dots(ax: Axes, x: Floats, y: Floats, size_pt: float, colour: str) -> None:
@@ -210,7 +210,9 @@ def dots(ax: Axes, x: Floats, y: Floats, size_pt: float, colour: str) -> None:
         return
     ends = np.repeat(np.column_stack([x[good], y[good]]), 2, axis=0)
     codes = np.tile(np.array([Path.MOVETO, Path.LINETO], dtype=np.uint8), n)
-    patch = PathPatch(Path(ends, codes), fill=False, edgecolor=colour, lw=size_pt, capstyle="round")
+    path = Path(ends, codes)
+    path.should_simplify = False  # it would drop lines without length
+    patch = PathPatch(path, fill=False, edgecolor=colour, lw=size_pt, capstyle="round")
     ax.add_patch(patch)
     ax.update_datalim(ends)
 

@@ -63,7 +63,7 @@ def distances(trajectory: Trajectory, pairs: Sequence[Distance], names: Mapping[
         side = min(2.35, height - 0.95)
         box = (0.55 / size[0], (height - 0.42 - side) / size[1], side / size[0], side / size[1])
         _map(figure.add_axes(box), pairs, ids)
-        span = 0.95 * max(6 * max(p.sd_mm for p in shown), 1e-6)
+        span = _round_up(max(*(4.5 * p.sd_mm for p in shown), 1e-6))
         left = 0.55 + side + 1.35
         box = (left / size[0], 0.4 / size[1], 1 - (left + 0.75) / size[0], 1 - 0.75 / size[1])
         ax = figure.add_axes(box)
@@ -86,6 +86,12 @@ def distances(trajectory: Trajectory, pairs: Sequence[Distance], names: Mapping[
                      loc="left", fontsize=7.5)  # fmt: skip
 
     return canvas.draw("distances", "Distances between markers", height, paint)
+
+
+def _round_up(value: float) -> float:
+    """The next of 1, 2, 5, 10, 20, … that is not below ``value``."""
+    decade = 10.0 ** np.floor(np.log10(value))
+    return float(min(s * decade for s in (1, 2, 5, 10) if s * decade >= value * 0.9999))
 
 
 def _map(ax: Axes, pairs: Sequence[Distance], ids: Sequence[int]) -> None:

@@ -31,8 +31,9 @@ def frequencies(spectrum: Spectrum, names: Mapping[int, str]) -> str:
         )[0][0]
         for k in range(1, int(top / nyquist) + 1):
             ax.axvline(k * nyquist, color=canvas.GRID, lw=0.9)
-            ax.text(k * nyquist, -0.75, f"{k * nyquist:.4g}", ha="center", va="bottom",
-                    fontsize=6.5, color=canvas.QUIET)  # fmt: skip
+            words = f"half the frame rate, {nyquist:.4g} Hz" if k == 1 else f"{k * nyquist:.4g} Hz"
+            ax.text(k * nyquist, -0.75, words, ha="center", va="bottom", fontsize=6.5,
+                    color=canvas.QUIET)  # fmt: skip
         ax.axvspan(nyquist, top, color=canvas.SHADE, lw=0, zorder=0)
         for row, line in enumerate(spectrum.lines):
             _line(ax, row, line)

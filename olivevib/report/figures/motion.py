@@ -121,6 +121,7 @@ def _frame(grid: Sequence[Sequence[Axes]]) -> None:
             ax.grid(axis="y")
             ax.locator_params(axis="y", nbins=4)
             ax.locator_params(axis="x", nbins=6, prune="upper")
-            ax.tick_params(labelleft=k == 0, labelbottom=r == len(grid) - 1)
+            first, last = k == 0, r == len(grid) - 1
+            ax.tick_params(labelleft=first, left=first, labelbottom=last, bottom=last)
     for ax in grid[-1]:
         ax.set_xlabel("trial clock, s")

@@ -50,7 +50,8 @@ def orbits(
                 down = -1 if plane[1] == "y" and trajectory.frame == "left camera" else 1
                 grid[r][c].set_xlim(-reach_mm, reach_mm)
                 grid[r][c].set_ylim(-reach_mm * down, reach_mm * down)
-                grid[r][c].tick_params(labelleft=c == 0, labelbottom=r == 2)
+                first, last = c == 0, r == 2
+                grid[r][c].tick_params(labelleft=first, left=first, labelbottom=last, bottom=last)
             grid[0][c].set_title(_two_lines(names[marker_id]), fontsize=7, pad=3)
         for r, (_, up) in enumerate(PLANES):
             over = PLANES[r][0]

@@ -54,7 +54,7 @@ def scene(rig: StereoRig, trajectory: Trajectory | None, names: Mapping[int, str
                 _paths(ax, how, trajectory, names)
             ax.set_aspect("equal", adjustable="datalim")
             ax.margins(0.08)
-        _triad(oblique, view, 0.12 * far)
+        _triad(oblique, view)
         oblique.set_axis_off()
         oblique.set_title("seen from behind the cameras", loc="left")
         _plan(plan, rig)
@@ -116,13 +116,14 @@ def _paths(ax: Axes, view: _View, trajectory: Trajectory, names: Mapping[int, st
         ax.annotate(str(int(marker_id)), (x, y), (3, 3), textcoords="offset points", fontsize=6.5)
 
 
-def _triad(ax: Axes, view: _View, length_mm: float) -> None:
-    """The axes of the left camera's frame, at its centre."""
+def _triad(ax: Axes, view: _View, at: tuple[float, float] = (0.9, 0.1)) -> None:
+    """The directions of the left camera's axes, in a corner of the drawing."""
     for k, axis in enumerate(np.eye(3)):
-        (x0, y0), (x1, y1) = view.flat(np.array([np.zeros(3), length_mm * axis]))
-        how = {"arrowstyle": "->", "color": canvas.AXIS_COLOURS[k], "lw": 1.0}
-        ax.annotate("", (x1, y1), (x0, y0), arrowprops=how)
-        ax.text(x1, y1, "xyz"[k], color=canvas.AXIS_COLOURS[k], fontsize=8, fontweight="bold")
+        direction = view.flat(axis[None])[0]
+        arrow = {"arrowstyle": "<-", "color": canvas.AXIS_COLOURS[k], "shrinkA": 5, "shrinkB": 0}
+        ax.annotate("xyz"[k], at, tuple(30 * direction), xycoords="axes fraction",
+                    textcoords="offset points", ha="center", va="center", fontsize=8,
+                    color=canvas.AXIS_COLOURS[k], fontweight="bold", arrowprops=arrow)  # fmt: skip
 
 
 def _plan(ax: Axes, rig: StereoRig) -> None:

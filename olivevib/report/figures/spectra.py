@@ -11,7 +11,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from olivevib.arrays import Floats
 from olivevib.report.figures import canvas
-from olivevib.report.words import measure, number, unit_text
+from olivevib.report.words import measure, plain, unit_text
 from olivevib.vibration.types import Line, LineStatus, Spectrum
 
 
@@ -33,16 +33,16 @@ def seen_at_hz(line: Line, nyquist_hz: float) -> float:
 
 
 def describe(line: Line) -> str:
-    """A line in words, never without its status: ``12.003 ± 0.002 Hz · direct``."""
+    """A line in words, never without its status: ``12.003 ± 0.002 Hz (direct)``."""
     if line.status is LineStatus.NONE:
         return "no line stands out of the noise"
     if line.candidates_hz and line.status in (LineStatus.AMBIGUOUS, LineStatus.ALIASED):
-        listed = [number(f, 4) for f in line.candidates_hz[:4]]
+        listed = [plain(f, 2) for f in line.candidates_hz[:4]]
         more = " …" if len(line.candidates_hz) > 4 else ""
         return f"{line.status}: " + " or ".join(listed) + more + " Hz"
     if not np.isfinite(line.f_hz):
         return str(line.status)
-    return f"{measure(line.f_hz, 'Hz', line.f_sigma_hz)} · {line.status}"
+    return f"{measure(line.f_hz, 'Hz', line.f_sigma_hz)} ({line.status})"
 
 
 def spectrum_rows(
@@ -66,7 +66,8 @@ def spectrum_rows(
             for k, ax in enumerate(row):
                 _panel(ax, spectrum, (m, k), kind)
                 ax.set_ylim(bottom, top)
-                ax.tick_params(labelleft=k == 0, labelbottom=r == len(ids) - 1)
+                first, last = k == 0, r == len(ids) - 1
+                ax.tick_params(labelleft=first, left=first, labelbottom=last, bottom=last)
         lines = dict(zip(spectrum.ids.tolist(), spectrum.lines, strict=True))
         canvas.row_names(figure, grid, [f"{names[i]} — {describe(lines[i])}" for i in ids])
         unit = unit_text(spectrum.unit)
@@ -112,7 +113,7 @@ def _frame(grid: Sequence[Sequence[Axes]]) -> None:
         ax.set_xlabel("frequency as sampled, Hz")
     for row in grid:
         for ax in row:
-            ax.locator_params(axis="x", nbins=7)
+            ax.locator_params(axis="x", nbins=7, prune="upper")
             ax.yaxis.set_major_locator(LogLocator(numticks=4))
             ax.yaxis.set_major_formatter("{x:g}")
             ax.yaxis.set_minor_locator(NullLocator())

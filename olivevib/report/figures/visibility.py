@@ -19,11 +19,11 @@ Strip = tuple[str, Floats, Ints]  # label, times (N,), states (N,)
 # height and colour of each state: full and dark = seen; the lower and thinner, the less is known
 _SHAPES: dict[State, tuple[float, dict[str, Any]]] = {
     State.SEEN: (0.7, {"facecolor": canvas.LEFT}),
-    State.FLAGGED: (0.7, {"facecolor": "none", "edgecolor": canvas.LEFT, "hatch": "/////"}),
+    State.FLAGGED: (0.7, {"facecolor": "none", "edgecolor": canvas.LEFT, "hatch": "///"}),
     State.HIDDEN: (0.3, {"facecolor": canvas.AXIS_COLOURS[1]}),
-    State.OUTSIDE: (0.3, {"facecolor": "none", "edgecolor": canvas.QUIET, "hatch": "...."}),
+    State.OUTSIDE: (0.3, {"facecolor": canvas.SECOND}),
     State.LOST: (0.3, {"facecolor": canvas.MARK}),
-    State.DAMAGED: (0.7, {"facecolor": "none", "edgecolor": canvas.MARK, "hatch": "xxxxx"}),
+    State.DAMAGED: (0.7, {"facecolor": "none", "edgecolor": canvas.MARK, "hatch": "xxx"}),
     State.DROPPED: (0.08, {"facecolor": canvas.INK}),
 }
 
