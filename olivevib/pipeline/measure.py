@@ -1,4 +1,4 @@
-"""Stages after tracking: reconstruct, analyse, compare."""
+"""Stages after tracking: reconstruct and analyse."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from olivevib.trial.records.trajectory import trajectory_file
 from olivevib.trial.records.vibration import vibration_file
 from olivevib.vibration import SamplingFacts, VibrationSettings
 from olivevib.vibration import analyse as analyse_motion
-
-SAME_CLOCK_S = 1e-4  # cameras whose offset is known better than this count as in known step
 
 
 def reconstruct(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:

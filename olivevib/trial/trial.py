@@ -8,17 +8,22 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from olivevib.errors import InputError
+from olivevib.comparison import Comparison
+from olivevib.errors import Caution, InputError
 from olivevib.files.rig_file import read_rig
 from olivevib.files.store import StageFile, read_stage
 from olivevib.geometry import StereoRig
 from olivevib.reconstruction import Reconstruction, Trajectory
 from olivevib.trial.document import change_settings, read_settings
 from olivevib.trial.fingerprints import PRIVATE, RIG, fingerprint, resolve
+from olivevib.trial.records.calibration import CalibrationRecord, calibration_from
+from olivevib.trial.records.comparison import comparisons_from
 from olivevib.trial.records.tracks import StoredTracks, tracks_from
 from olivevib.trial.records.trajectory import reconstruction_from
+from olivevib.trial.records.vibration import vibration_from
 from olivevib.trial.settings import TrialSettings
 from olivevib.trial.stages import BY_NAME, Fingerprint, Stage, StageState, stage_states
+from olivevib.vibration import Spectrum, Vibration
 
 
 @dataclass(frozen=True)
@@ -101,6 +106,40 @@ class Trial:
     def trajectory(self) -> Trajectory | None:
         """The 3-D paths of the markers."""
         return self.reconstruction.trajectory if self.reconstruction else None
+
+    @cached_property
+    def calibration(self) -> CalibrationRecord | None:
+        """What the calibration says of itself: residuals, hold-out numbers, verdict, offset."""
+        file = self._stage_file("calibrate")
+        return calibration_from(file) if file else None
+
+    @cached_property
+    def vibration(self) -> Vibration | None:
+        """Phases, lines and figures of every marker."""
+        file = self._stage_file("analyse")
+        return vibration_from(file) if file else None
+
+    @property
+    def spectra(self) -> Mapping[str, Spectrum]:
+        """Spectra by quantity: displacement, velocity, acceleration; empty before analyse."""
+        return self.vibration.spectra if self.vibration else {}
+
+    @cached_property
+    def _compared(self) -> tuple[tuple[Comparison, ...], tuple[Caution, ...]]:
+        file = self._stage_file("compare")
+        return comparisons_from(file) if file else ((), ())
+
+    @property
+    def comparison(self) -> tuple[Comparison, ...]:
+        """One comparison a bound accelerometer."""
+        return self._compared[0]
+
+    @property
+    def cautions(self) -> tuple[Caution, ...]:
+        """The warnings of every stage that has run, in order."""
+        parts = (self.calibration, self.tracks, self.reconstruction, self.vibration)
+        found = [c for part in parts if part is not None for c in part.cautions]
+        return tuple(dict.fromkeys([*found, *self._compared[1]]))
 
     def _stage_file(self, name: str) -> StageFile | None:
         stage = BY_NAME[name]

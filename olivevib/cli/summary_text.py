@@ -1,0 +1,125 @@
+"""The summary of a trial as text for a terminal: words before numbers, units on every number."""
+
+from __future__ import annotations
+
+from typing import Any
+
+CANDIDATES_SHOWN = 5
+
+
+def summary_text(facts: dict[str, Any]) -> str:
+    """Stages, calibration, timing, markers, comparison and warnings, one block each."""
+    title = facts["trial"] + ("   (simulated)" if facts["simulated"] else "")
+    blocks = [
+        [title],
+        [f"  {name:12} {s['state']:8} {s['reason']}" for name, s in facts["stages"].items()],
+        _calibration(facts["calibration"]),
+        _timing(facts["timing"]),
+        _markers(facts["markers"]),
+        _comparison(facts["comparison"]),
+        [f"warning [{w['code']}]: {w['text']}\n    {w['remedy']}" for w in facts["warnings"]],
+    ]
+    return "\n\n".join("\n".join(block) for block in blocks if block)
+
+
+def number(value: float | None, digits: int, unit: str = "") -> str:
+    """The number with its unit, or "not known"."""
+    return "not known" if value is None else f"{value:.{digits}f}{' ' * bool(unit)}{unit}"
+
+
+def _calibration(c: dict[str, Any]) -> list[str]:
+    if c["baseline_mm"] is None:
+        return []
+    lines = ["calibration"]
+    for side in ("left", "right"):
+        lens = c[side]
+        lines.append(
+            f"  {side:6} fx {lens['fx']:.1f}  fy {lens['fy']:.1f}  cx {lens['cx']:.1f}  "
+            f"cy {lens['cy']:.1f} px   rms {number(lens['rms_px'], 3, 'px')}"
+        )
+    lines.append(f"  baseline {c['baseline_mm']:.1f} mm")
+    if c["holdout_rms_mm"] is not None:
+        lines.append(
+            f"  unused frames: distances {c['holdout_rms_mm']:.3f} mm rms "
+            f"({c['holdout_rms_percent']:.2f} %), epipolar {number(c['epipolar_rms_px'], 2, 'px')}"
+        )
+    if c["verdict"]:
+        lines.append(f"  {c['verdict']}")
+    return lines
+
+
+def _timing(t: dict[str, Any]) -> list[str]:
+    if t["left"]["frame_rate_hz"] is None:
+        return []
+    lines = ["timing"]
+    for side in ("left", "right"):
+        s = t[side]
+        row = "not known" if s["row_time_s"] is None else f"{s['row_time_s'] * 1e6:.2f} µs"
+        lines.append(
+            f"  {side:6} {s['frame_rate_hz']:.3f} frames/s, stamps scatter "
+            f"{s['stamp_jitter_s'] * 1e3:.2f} ms, {s['dropped']} dropped; row time {row} "
+            f"({s['source']})"
+        )
+    if t["right_offset_source"]:
+        offset, sigma = t["right_offset_s"], t["right_offset_sigma_s"]
+        words = "not known, taken as zero" if offset is None else f"{offset * 1e3:+.2f} ms"
+        spread = "" if offset is None or sigma is None else f" ± {sigma * 1e3:.2f} ms"
+        lines.append(f"  right camera's offset {words}{spread} ({t['right_offset_source']})")
+    return lines
+
+
+def _markers(rows: list[dict[str, Any]]) -> list[str]:
+    if not rows:
+        return []
+    lines = [
+        "markers (peak amplitude of the dominant line)",
+        "    id place    seen   x mm    y mm    z mm   p-p mm  rms m/s²  frequency",
+    ]
+    for m in rows:
+        a = [f"{m['amplitude_mm'][k]:7.3f}" if _has(m["amplitude_mm"][k]) else "      –" for k in "xyz"]
+        pp = f"{m['displacement_pp_mm']:8.3f}" if _has(m["displacement_pp_mm"]) else "       –"
+        rms = f"{m['acceleration_rms_m_s2']:9.2f}" if _has(m["acceleration_rms_m_s2"]) else "        –"
+        lines.append(
+            f"  {m['id']:4d} {m['place'] or '–':8} {m['seen_fraction']:4.0%} {' '.join(a)} "
+            f"{pp} {rms}  {frequency(m)}"
+        )
+    return lines
+
+
+def _has(value: float | None) -> bool:
+    return value is not None
+
+
+def frequency(m: dict[str, Any]) -> str:
+    """The frequency with its status; candidates where it is not decided, never a bare number."""
+    status = m["frequency_status"]
+    if status is None:
+        return "not analysed"
+    if m["frequency_hz"] is not None:
+        sigma = m["frequency_sigma_hz"]
+        spread = f" ± {sigma:.4f}" if sigma is not None else ""
+        return f"{m['frequency_hz']:.4f}{spread} Hz, {status}"
+    candidates = m["frequency_candidates_hz"]
+    if not candidates:
+        return str(status)
+    shown = [f"{f:.2f}" for f in candidates[:CANDIDATES_SHOWN]]
+    more = ", …" if len(candidates) > CANDIDATES_SHOWN else ""
+    return f"{status}: {', '.join(shown)}{more} Hz"
+
+
+def _comparison(c: dict[str, Any]) -> list[str]:
+    if c["verdict"] is None:
+        return []
+    lines = [f"accelerometer: {c['verdict']}", f"  {c['reason']}"]
+    if c["clock_offset_s"] is not None:
+        lines.append(
+            f"  clock offset {c['clock_offset_s'] * 1e3:+.3f} ± "
+            f"{number(_ms(c['clock_offset_sigma_s']), 3)} ms, "
+            f"drift {number(c['clock_drift_ppm'], 1, 'ppm')}, gain {number(c['gain'], 4)}, "
+            f"rotation {number(c['rotation_deg'], 1, '°')}, coherence {number(c['coherence'], 3)}"
+        )
+    return lines
+
+
+def _ms(value: float | None) -> float | None:
+    return None if value is None else value * 1e3

@@ -1,0 +1,21 @@
+"""The only door for those above: one function a stage, and the order of the stages."""
+
+from olivevib.pipeline.calibrate import calibrate
+from olivevib.pipeline.compare import compare
+from olivevib.pipeline.measure import analyse, reconstruct
+from olivevib.pipeline.new import NewTrial, new_trial
+from olivevib.pipeline.run import Outcome, run, run_stage
+from olivevib.pipeline.track import track
+
+__all__ = [
+    "NewTrial",
+    "Outcome",
+    "analyse",
+    "calibrate",
+    "compare",
+    "new_trial",
+    "reconstruct",
+    "run",
+    "run_stage",
+    "track",
+]
