@@ -26,7 +26,7 @@ _RESEMBLES = 0.8  # correlation below which the two motions are not called the s
 _CLOSE = 0.05  # a rival lag whose correlation comes that near is told
 _DECISIVE = 25.0  # chi-square by which the best lag must beat the rival to be sure
 _OPEN_DEG = 20.0
-_LEAST_LEFT = 0.03  # of the motion's power that taking out the slow part must leave
+_LEAST_LEFT = 0.005  # of the motion's power that taking out the slow part must leave
 _NO_COLUMNS = Nuisance(np.empty((0, 0)))
 
 

@@ -59,20 +59,28 @@ def envelope_offset(
 ) -> float | None:
     """The offset at which the rolling RMS of both correlate best; None where they are level.
 
-    Start-up and shut-down shape the envelopes; a steady tone alone has none.
+    Start-up and shut-down shape the envelopes; a steady tone alone has none. The sensor is
+    sampled at the camera's rate, so that what folds into the slow part is lost to both alike.
     """
     hop = _ENVELOPE_HOP_S
     columns = nuisance(camera_s, slow_hz)
     optical = _rolling(camera_s, columns.out(camera_mm), hop)
-    n = int((motion.end_s - motion.start_s) / 1e-3)
-    dense = np.asarray(motion.start_s + np.arange(n) * 1e-3, dtype=np.float64)
-    sensor = _rolling(dense, motion.seen(dense, 0.0), hop)
+    sensor_s = _camera_like(camera_s, motion)
+    predicted = nuisance(sensor_s, slow_hz).out(motion.seen(sensor_s, 0.0))
+    sensor = _rolling(sensor_s, predicted, hop)
     if optical.size < 5 or sensor.size < 5 or not (_lively(optical) and _lively(sensor)):
         return None
     first = motion.start_s - float(camera_s[0])
     lags = np.arange(int((limits[0] - first) / hop), int((limits[1] - first) / hop) + 1)
     worth = [_correlation(optical, sensor, int(k)) for k in lags]
     return first + float(lags[int(np.argmax(worth))]) * hop
+
+
+def _camera_like(camera_s: Floats, motion: SensorMotion) -> Floats:
+    """The instants at which a camera of that rate would have sampled the sensor's record."""
+    period = float(np.median(np.diff(camera_s)))
+    count = int((motion.end_s - motion.start_s) / period)
+    return np.asarray(motion.start_s + np.arange(count) * period, dtype=np.float64)
 
 
 def _rolling(t_s: Floats, values: Floats, hop: float) -> Floats:
