@@ -131,5 +131,5 @@ def _result_verbs(verbs: Any) -> None:
 
 
 def _other_verbs(verbs: Any) -> None:
-    doctor = _add(verbs, "doctor", "home:doctor", "what works on this machine")
+    doctor = _add(verbs, "doctor", "doctor:doctor", "what works on this machine")
     doctor.add_argument("--json", action="store_true", help="for programs")

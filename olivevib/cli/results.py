@@ -51,7 +51,9 @@ def export(arguments: argparse.Namespace, console: Console) -> int:
     if arguments.output == "-":
         pipeline.export(trial, arguments.to, sys.stdout.buffer, ids)
         return 0
-    target = Path(arguments.output) if arguments.output else pipeline.export_place(trial, arguments.to)
+    target = (
+        Path(arguments.output) if arguments.output else pipeline.export_place(trial, arguments.to)
+    )
     pipeline.export(trial, arguments.to, target, ids)
     _out(str(target))
     return 0

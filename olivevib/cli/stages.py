@@ -12,7 +12,7 @@ from olivevib.cli.console import Console
 if TYPE_CHECKING:
     from olivevib.trial import Trial
 
-PAPER_KEYS = {
+PAPER_KEYS: dict[str, dict[str, object]] = {
     "calibrate": {"calibration.paper": True},
     "track": {"detection.mode": "paper", "detection.paper_centre": True},
     "reconstruct": {"reconstruction.paper": True},

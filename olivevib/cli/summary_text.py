@@ -76,9 +76,16 @@ def _markers(rows: list[dict[str, Any]]) -> list[str]:
         "    id place    seen   x mm    y mm    z mm   p-p mm  rms m/s²  frequency",
     ]
     for m in rows:
-        a = [f"{m['amplitude_mm'][k]:7.3f}" if _has(m["amplitude_mm"][k]) else "      –" for k in "xyz"]
+        a = [
+            f"{m['amplitude_mm'][k]:7.3f}" if _has(m["amplitude_mm"][k]) else "      –"
+            for k in "xyz"
+        ]
         pp = f"{m['displacement_pp_mm']:8.3f}" if _has(m["displacement_pp_mm"]) else "       –"
-        rms = f"{m['acceleration_rms_m_s2']:9.2f}" if _has(m["acceleration_rms_m_s2"]) else "        –"
+        rms = (
+            f"{m['acceleration_rms_m_s2']:9.2f}"
+            if _has(m["acceleration_rms_m_s2"])
+            else "        –"
+        )
         lines.append(
             f"  {m['id']:4d} {m['place'] or '–':8} {m['seen_fraction']:4.0%} {' '.join(a)} "
             f"{pp} {rms}  {frequency(m)}"

@@ -1,20 +1,27 @@
 """The only door for those above: one function a stage, and the order of the stages."""
 
 from olivevib.pipeline.calibrate import calibrate
+from olivevib.pipeline.check import Finding, check
 from olivevib.pipeline.compare import compare
 from olivevib.pipeline.measure import analyse, reconstruct
 from olivevib.pipeline.new import NewTrial, new_trial
+from olivevib.pipeline.outputs import export, export_place, report
 from olivevib.pipeline.run import Outcome, run, run_stage
 from olivevib.pipeline.track import track
 
 __all__ = [
+    "Finding",
     "NewTrial",
     "Outcome",
     "analyse",
     "calibrate",
+    "check",
     "compare",
+    "export",
+    "export_place",
     "new_trial",
     "reconstruct",
+    "report",
     "run",
     "run_stage",
     "track",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from olivevib.files.store import write_stage
+from dataclasses import replace
 
 from olivevib.errors import Caution, InputError
+from olivevib.files.store import write_stage
 from olivevib.geometry import StereoRig
 from olivevib.pipeline.libraries import corners_mm, trial_library
 from olivevib.progress import Tick, silent
@@ -64,24 +65,27 @@ def trial_clock(trial: Trial, tracks: StoredTracks) -> TrialClock:
     A stated offset wins; else that of the calibration where board and trial are one recording (the
     lag changes from recording to recording); else unknown, taken as zero.
     """
-    rows = {side: tracks.cameras[side].row_time_s for side in ("left", "right")}
-    stated = trial.settings.reconstruction.right_offset_ms
-    both = {"left_row_time_s": rows["left"], "right_row_time_s": rows["right"]}
     middle = tracks.cameras["left"].size_px[1] / 2
+    plain = TrialClock(
+        reference_row=middle,
+        left_row_time_s=tracks.cameras["left"].row_time_s,
+        right_row_time_s=tracks.cameras["right"].row_time_s,
+    )
+    stated = trial.settings.reconstruction.right_offset_ms
     if stated is not None:
-        return TrialClock(stated * 1e-3, float("nan"), middle, "declared", **both)
+        return replace(plain, right_offset_s=stated * 1e-3, source="declared")
     calibration = trial.calibration
     c, cameras = trial.settings.calibration, trial.settings.cameras
     same = c.left == cameras.left.video and c.right == cameras.right.video
     if same and calibration is not None and calibration.right_offset_sigma_s > 0:
-        return TrialClock(
-            calibration.right_offset_s,
-            calibration.right_offset_sigma_s,
-            calibration.reference_row,
-            "calibration",
-            **both,
+        return replace(
+            plain,
+            right_offset_s=calibration.right_offset_s,
+            right_offset_sigma_s=calibration.right_offset_sigma_s,
+            reference_row=calibration.reference_row,
+            source="calibration",
         )
-    return TrialClock(reference_row=middle, **both)
+    return plain
 
 
 def sampling_facts(trial: Trial, clock: TrialClock) -> SamplingFacts:

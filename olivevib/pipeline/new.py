@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import tomlkit
-from olivevib.files.stamps import pick_camera
-from olivevib.files.stills import IMAGE_SUFFIXES
 from tomlkit.items import Table
 
 from olivevib.calibration.boards import parse_board
 from olivevib.errors import InputError, UsageError
 from olivevib.files.atomic import as_input_error
+from olivevib.files.stamps import pick_camera
+from olivevib.files.stills import IMAGE_SUFFIXES
 from olivevib.files.video import Video
 from olivevib.marker import load_library
 from olivevib.pipeline.libraries import only_known
@@ -274,7 +274,7 @@ def _calibration(plan: NewTrial, places: _Places) -> Table | None:
     )
 
 
-def _table(values: dict[str, object]) -> Table:
+def _table(values: Mapping[str, object]) -> Table:
     table = tomlkit.table()
     for key, value in values.items():
         if value is not None:

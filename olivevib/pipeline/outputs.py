@@ -20,7 +20,7 @@ def export_place(trial: Trial, to: str) -> Path:
 def export(
     trial: Trial, to: str, target: Path | BinaryIO, ids: tuple[int, ...] | None = None
 ) -> None:
-    """Write the paths of the markers ``ids`` (None: all) as ``to``; InputError before reconstruct."""
+    """Write the paths of the markers ``ids`` (None: all); InputError before reconstruct."""
     trajectory = trial.trajectory
     if trajectory is None:
         raise trial.need("reconstruct")

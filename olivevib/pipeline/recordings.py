@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from olivevib.files.stamps import read_stamp_file
 
 from olivevib.arrays import Floats
 from olivevib.errors import Caution, InputError
+from olivevib.files.stamps import read_stamp_file
 from olivevib.signals import StampFit, fit_stamps
 
 SIDES = ("left", "right")

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
+from olivevib.errors import Caution, OlivevibError
 from olivevib.pipeline.calibrate import calibrate
 from olivevib.pipeline.compare import compare
-
-from olivevib.errors import Caution, OlivevibError
 from olivevib.pipeline.measure import analyse, reconstruct
 from olivevib.pipeline.track import track
 from olivevib.progress import Tick, silent

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from olivevib.files.journal import Journal
-from olivevib.files.store import write_stage
-
 from olivevib.detection import DetectionSettings
 from olivevib.errors import Caution
+from olivevib.files.journal import Journal
+from olivevib.files.store import write_stage
 from olivevib.files.video import Frame, Video, VideoInfo
 from olivevib.marker import MarkerLibrary
 from olivevib.pipeline.libraries import trial_library

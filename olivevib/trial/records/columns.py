@@ -110,14 +110,10 @@ def figures_from(columns: Columns, quantity: str, unit: str) -> list[Figures]:
     names = [f.name for f in fields(Figures) if f.name not in NOT_COLUMNS]
     arrays = {name: np.asarray(columns[name].values) for name in names}
     count = len(arrays["rms"])
-    return [
-        Figures(
-            quantity=quantity,
-            unit=unit,
-            **{n: a[k] if a.ndim > 1 else float(a[k]) for n, a in arrays.items()},
-        )
-        for k in range(count)
+    rows: list[dict[str, Any]] = [
+        {n: a[k] if a.ndim > 1 else float(a[k]) for n, a in arrays.items()} for k in range(count)
     ]
+    return [Figures(quantity=quantity, unit=unit, **row) for row in rows]
 
 
 def texts(rows: Sequence[Sequence[str]]) -> str:

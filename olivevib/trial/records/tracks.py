@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -134,10 +135,9 @@ def tracks_from(file: StageFile) -> StoredTracks:
     )
 
 
-def _sized(record: dict[str, object]) -> dict[str, object]:
-    size = record["size_px"]
-    assert isinstance(size, list)
-    return record | {"size_px": tuple(size)}
+def _sized(record: dict[str, Any]) -> dict[str, Any]:
+    """JSON has no tuples."""
+    return record | {"size_px": tuple(record["size_px"])}
 
 
 def _tracks(file: StageFile, side: str, localiser: str) -> tuple[Track, ...]:

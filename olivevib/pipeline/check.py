@@ -1,0 +1,102 @@
+"""Integrity of a trial: what is whole, what is lost, what can be remade."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from olivevib.errors import OlivevibError
+from olivevib.files.rig_file import read_rig
+from olivevib.files.stills import open_source
+from olivevib.files.store import read_stage
+from olivevib.pipeline.recordings import SIDES
+from olivevib.progress import Tick, silent
+from olivevib.trial import STAGES, Trial
+from olivevib.trial.fingerprints import PRIVATE, RIG
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing in a trial: "whole", "damaged" (usable in part), "remake" (a stage), or "lost"."""
+
+    state: str
+    what: str
+    words: str
+
+
+def check(folder: Path, tick: Tick = silent) -> list[Finding]:
+    """Read everything in a trial from end to end; nothing is changed."""
+    try:
+        trial = Trial.open(folder)
+    except OlivevibError as error:
+        return [Finding("lost", "trial.toml", f"{error}")]
+    return [
+        Finding("whole", "trial.toml", ""),
+        *_recordings(trial, tick),
+        *_sensors(trial),
+        *_stages(trial),
+    ]
+
+
+def _recordings(trial: Trial, tick: Tick) -> Iterator[Finding]:
+    cameras, calibration = trial.settings.cameras, trial.settings.calibration
+    named = [(side, getattr(cameras, side).video) for side in SIDES]
+    named += [(side, getattr(calibration, side)) for side in SIDES]
+    seen: set[tuple[str, str]] = set()
+    for side, name in named:
+        if name and (side, name) not in seen:
+            seen.add((side, name))
+            yield _recording(trial.path(name), name, side, tick)
+
+
+def _recording(path: Path, name: str, side: str, tick: Tick) -> Finding:
+    frames = damaged = 0
+    try:
+        with open_source(path, side) as source:
+            for frame in source.frames():
+                frames += 1
+                damaged += frame.grey is None
+                tick(frames, None, f"reading {name}")
+            cautions = source.cautions
+    except OlivevibError as error:
+        return Finding("lost", name, f"{error}")
+    told = "; ".join(c.text for c in cautions)
+    return Finding("damaged" if told else "whole", name, told or f"{frames} frames")
+
+
+def _sensors(trial: Trial) -> Iterator[Finding]:
+    from olivevib.files.accelerometer import read_accelerometer
+    from olivevib.pipeline.compare import import_options
+
+    for sensor in trial.settings.accelerometers:
+        try:
+            record = read_accelerometer(trial.path(sensor.file), import_options(sensor))
+        except OlivevibError as error:
+            yield Finding("lost", sensor.file, f"{error}")
+        else:
+            words = f"{record.samples.t_s.size} samples at {record.rate_hz:.2f} Hz"
+            yield Finding("whole", sensor.file, words)
+
+
+def _stages(trial: Trial) -> Iterator[Finding]:
+    states = trial.states()
+    for stage in STAGES:
+        path = trial.folder / stage.file
+        if not path.exists():
+            continue
+        try:
+            read_stage(path, stage.name)
+        except OlivevibError as error:
+            yield Finding("remake", stage.file, f"{error} Run: olivevib run {trial.name}")
+        else:
+            yield Finding("whole", stage.file, str(states[stage.name].state))
+    if (trial.folder / RIG).exists():
+        try:
+            read_rig(trial.folder / RIG)
+        except OlivevibError as error:
+            yield Finding("remake", RIG, f"{error} Run: olivevib calibrate {trial.name}")
+        else:
+            yield Finding("whole", RIG, "")
+    if (trial.folder / PRIVATE / "track.journal").exists():
+        yield Finding("whole", "track.journal", "unfinished tracking; run goes on from there")
