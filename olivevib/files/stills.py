@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from types import TracebackType
+from typing import Literal, Self
 
 import cv2
 import numpy as np
@@ -102,10 +103,10 @@ def _natural(path: Path) -> tuple[list[tuple[int, int, str]], str]:
 
 @dataclass(frozen=True)
 class GreySource:
-    """Frames of one camera from a video or from a folder of stills.
+    """Frames of one camera from a video or from a folder of stills; a context manager.
 
-    count_hint: how many there are (for a video what its header promises, or None); names: the
-    still each frame comes from, empty for a video. Stills have no time stamps (NaN).
+    count_hint: how many there are (for a video what its header promises, or None). Stills have
+    no time stamps (NaN); ``names`` says which file each frame comes from, empty for a video.
     """
 
     path: Path
@@ -113,24 +114,41 @@ class GreySource:
     size_px: tuple[int, int]
     count_hint: int | None
     stills: tuple[Path, ...] = ()
+    video: Video | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release the file, also where a walk was left half way."""
+        if self.video is not None:
+            self.video.close()
 
     @property
     def names(self) -> tuple[str, ...]:
         """The file name of each still."""
         return tuple(still.name for still in self.stills)
 
-    def frames(self, cautions: list[Caution] | None = None) -> Iterator[Frame]:
-        """All frames in order; what a video turned out to lack is added to ``cautions``.
+    @property
+    def cautions(self) -> tuple[Caution, ...]:
+        """What the last complete walk found missing or damaged in a video."""
+        return () if self.video is None else self.video.cautions
 
-        Raises InputError for a still that cannot be read or has another size than the first.
+    def frames(self) -> Iterator[Frame]:
+        """All frames in order.
+
+        Raises InputError for a still that cannot be read or has another size than the first, and
+        as ``Video.frames`` does.
         """
-        if self.kind == "stills":
-            yield from self._still_frames()
-            return
-        with Video.open(self.path) as video:
-            yield from video.frames()
-            if cautions is not None:
-                cautions.extend(video.cautions)
+        return self._still_frames() if self.video is None else self.video.frames()
 
     def _still_frames(self) -> Iterator[Frame]:
         for index, still in enumerate(self.stills):
@@ -155,6 +173,8 @@ def open_source(path: str | Path, side: str) -> GreySource:
         stills = list_stills(path, side)
         height, width = read_grey(stills[0]).shape
         return GreySource(Path(path), "stills", (width, height), len(stills), stills)
-    with Video.open(path) as video:
-        info = video.info
-    return GreySource(info.path, "video", info.size_px, info.frame_count_hint)
+    video = Video.open(path)
+    info = video.info
+    return GreySource(
+        info.path, "video", info.size_px, info.frame_count_hint, stills=(), video=video
+    )
