@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from dataclasses import dataclass
+from functools import cached_property
 
 _BLANK = re.compile(r"(?i)\s*(nan|na|n/a|null|none|inf|-inf|#n/a|-|--|)\s*")
 STAMP = re.compile(
@@ -32,6 +33,7 @@ class Dialect:
                 return line.split(self.separator)
         return line.split(self.separator)
 
+    @cached_property
     def number(self) -> re.Pattern[str]:
         """What a number looks like in this dialect."""
         mark = re.escape(self.decimal)
@@ -43,8 +45,7 @@ class Dialect:
 
     def kinds(self, cells: list[str]) -> str:
         """One letter a cell: n number, s stamp, b blank or NaN, t other text."""
-        number = self.number()
-        return "".join(_kind(cell, number) for cell in cells)
+        return "".join([_kind(cell, self.number) for cell in cells])
 
 
 def _kind(cell: str, number: re.Pattern[str]) -> str:

@@ -42,6 +42,9 @@ def stamp_timing(stamps_s: Floats, same: Bools, start: datetime | None, source: 
     that wander give themselves (knowledge of the field: vibration analysis 4.1). InputError where
     the clock starts anew within the file.
     """
+    if (np.diff(stamps_s) > 0).all() and stamps_s.size > 1:  # as most files are (NaN fails, too)
+        t_s, clock = _fit(stamps_s, start, source, even=False)
+        return Timing(np.ones(t_s.size, np.bool_), t_s, clock)
     stamps = _unwrapped(stamps_s)
     keep = np.isfinite(stamps)
     backward = _backward_rows(stamps, keep, source)
@@ -66,10 +69,12 @@ def stamp_timing(stamps_s: Floats, same: Bools, start: datetime | None, source: 
 
 def _unwrapped(stamps: Floats) -> Floats:
     """Stamps with 16 and 32 bit counters of ms and µs, and midnights, carried on."""
+    good = np.flatnonzero(np.isfinite(stamps))
+    steps = np.diff(stamps[good])
+    if not (steps < 0).any():
+        return stamps
     out = stamps.copy()
-    good = np.flatnonzero(np.isfinite(out))
-    steps = np.diff(out[good])
-    usual = float(np.median(np.abs(steps))) if steps.size else 0.0
+    usual = float(np.median(np.abs(steps)))
     for at in np.flatnonzero(steps < 0):
         for wrap in (*_WRAPS_S, 86400.0):
             if 0 <= steps[at] + wrap < max(20 * usual, wrap / 1000) and wrap > 10 * usual:
@@ -142,11 +147,11 @@ def _fit(
     sequence = _sequence(stamps, holes)
     intercept, period = _line(sequence, stamps)
     _check_rate(1 / period, source)
-    residual = stamps - intercept - period * sequence
-    scatter = float(np.sqrt(np.mean(residual**2)))
+    line_s = np.asarray(intercept + period * sequence)
+    residual = stamps - line_s
+    scatter = math.sqrt(float(residual @ residual) / residual.size)
     roughness = _roughness(residual, scatter)
     wanders = not even and scatter > 1e-3 * period and roughness < 0.4 and stamps.size > 10
-    line_s = np.asarray(intercept + period * sequence)
     sigma = _period_sigma(sequence, scatter, roughness)
     if wanders:
         period, sigma = _middle_period(sequence, stamps)
@@ -164,6 +169,8 @@ def _fit(
 
 def _gap_steps(steps: Floats) -> Ints:
     """The steps that are holes: above 1.5 periods; of a jittery clock far beyond its 99 %."""
+    if steps.max() < 1.5 * steps.min():
+        return np.empty(0, np.int64)
     usual = float(np.median(steps))
     ratio = steps / usual
     off_grid = ratio - np.rint(ratio)
@@ -200,13 +207,13 @@ def _sequence(stamps: Floats, holes: Ints) -> Ints:
 
 def _scatter(sequence: Ints, stamps: Floats) -> float:
     intercept, period = _line(sequence, stamps)
-    return float(np.sqrt(np.mean((stamps - intercept - period * sequence) ** 2)))
+    return float(np.std(stamps - intercept - period * sequence))
 
 
 def _line(sequence: Ints, stamps: Floats) -> tuple[float, float]:
     middle = float(sequence.mean())
     n = sequence - middle
-    slope = float(np.sum(n * (stamps - stamps.mean())) / np.sum(n**2))
+    slope = float(n @ (stamps - stamps.mean())) / float(n @ n)
     return float(stamps.mean()) - slope * middle, slope
 
 
@@ -214,7 +221,8 @@ def _roughness(residual: Floats, scatter: float) -> float:
     """1 for white scatter, towards 0 for a slow wave: rms step over sqrt(2) rms."""
     if scatter == 0 or residual.size < 3:
         return 1.0
-    return float(np.sqrt(np.mean(np.diff(residual) ** 2))) / (math.sqrt(2.0) * scatter)
+    steps = np.diff(residual)
+    return math.sqrt(float(steps @ steps) / steps.size) / (math.sqrt(2.0) * scatter)
 
 
 def _middle_period(sequence: Ints, stamps: Floats) -> tuple[float, float]:
@@ -232,7 +240,7 @@ def _period_sigma(sequence: Ints, scatter: float, roughness: float) -> float:
     """Sigma of the line's slope, with fewer independent samples where the residual is a wave."""
     correlation = min(max(1 - roughness**2, 0.0), 0.9999)
     independent: float = max(2.0, sequence.size * (1 - correlation) / (1 + correlation))
-    spread = float(np.std(sequence.astype(np.float64)))
+    spread = float(sequence[-1] - sequence[0] + 1) / math.sqrt(12.0)
     return float(scatter / (spread * math.sqrt(independent)))
 
 

@@ -78,7 +78,7 @@ def _times(
     """The column of the times, or date and time of day; none where the format has its own."""
     if options.time_column is not None:
         return (_find(options.time_column, table, source),)
-    if table.stamps_s is not None:
+    if table.stamps_s is not None or table.rate_hz is not None:
         return ()
     found = [k for k, m in enumerate(meanings) if m.quantity == TIME]
     with_unit = [k for k in found if meanings[k].unit is not None]
@@ -146,7 +146,10 @@ def _sets(found: list[int], meanings: tuple[Meaning, ...]) -> list[dict[str, int
     """Columns grouped by the name without its axis; the fullest groups alone."""
     groups: dict[str, dict[str, int]] = {}
     for k in found:
-        groups.setdefault(meanings[k].group, {}).setdefault(meanings[k].axis, k)
+        group = meanings[k].group
+        while meanings[k].axis in groups.setdefault(group, {}):
+            group += " again"
+        groups[group][meanings[k].axis] = k
     most = max((len(g) for g in groups.values()), default=0)
     return [g for g in groups.values() if len(g) == most]
 

@@ -10,6 +10,7 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
+_CONTROL = bytes([*range(9), *range(14, 32)])
 
 
 def find_encoding(head: bytes) -> str | None:
@@ -23,7 +24,7 @@ def find_encoding(head: bytes) -> str | None:
             return name
     if b"\0" in head:
         return _wide(head)
-    if sum(b < 9 or 13 < b < 32 for b in head) > len(head) // 100:
+    if len(head) - len(head.translate(None, _CONTROL)) > len(head) // 100:
         return None
     decoder = codecs.getincrementaldecoder("utf-8")()
     try:

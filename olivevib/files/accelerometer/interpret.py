@@ -29,10 +29,10 @@ from olivevib.signals import Samples
 def interpret(table: Table, options: ImportOptions, source: str) -> AccelerometerRecord:
     """Decide axes, times and unit of a table; InputError where the file leaves one open."""
     choice = choose_columns(table, options, source)
-    raw = np.column_stack([table.channels[k].values for k, _ in choice.axes])
+    raw = np.stack([table.channels[k].values for k, _ in choice.axes]).T
     timing, more = _timing(table, choice, raw, options, source)
-    raw = raw[timing.keep]
-    if np.isfinite(raw).sum() == 0:
+    raw = raw if timing.keep.all() else raw[timing.keep]
+    if not np.isfinite(raw).any():
         raise InputError(
             f"{source} has no readable acceleration.",
             "Every cell of " + ", ".join(_used(choice)) + " is empty or no number.",
@@ -77,7 +77,7 @@ def _timing(
     table: Table, choice: Choice, raw: Floats, options: ImportOptions, source: str
 ) -> tuple[Timing, tuple[Caution, ...]]:
     """The times of the rows: declared rate, the format's or a column's stamps, or header rate."""
-    declared = table.rate_hz or header_rate_hz(table)
+    declared = header_rate_hz(table)
     start = _declared_start(options, source) or table.start or header_start(table)
     if options.rate_hz is not None:
         return even_timing(table.rows, options.rate_hz, start=start), ()
@@ -85,6 +85,8 @@ def _timing(
     if table.stamps_s is not None:
         timing = stamp_timing(table.stamps_s, same, start, source)
         return timing, ()
+    if table.rate_hz is not None and options.time_column is None:
+        return even_timing(table.rows, table.rate_hz, table.t0_s, start), ()
     if not choice.times:
         if declared is None:
             raise InputError(

@@ -13,8 +13,8 @@ def clipped(values: Floats) -> int:
     """How many values of one axis (N,), in the file's unit, stand at a limit.
 
     A 16-bit rail of whole numbers counts always; another extreme only where at least five values
-    stand exactly on it, five times as many as on each of the next levels (a clean sine has up
-    to 2.5 times as many on its top level).
+    stand exactly on it, five times as many as in each of the next 2 % of the range (a sine has
+    fewer on its very top than just below).
     """
     good = values[np.isfinite(values)]
     if good.size < 3 or good.max() == good.min():
@@ -31,10 +31,12 @@ def _piled(values: Floats) -> int:
     at_top = int((values == top).sum())
     if at_top < 5:
         return 0
-    levels, counts = np.unique(values[values > np.median(values)], return_counts=True)
-    if levels.size < 10:  # a quiet, coarse signal: its levels are few and say nothing
+    middle = float(np.median(values))
+    upper = values[values > middle]
+    if np.unique(upper).size < 10:  # a quiet, coarse signal: its levels are few and say nothing
         return 0
-    return at_top if at_top >= 5 * float(counts[-6:-1].mean()) else 0
+    near = int(((upper < top) & (upper > top - 0.1 * (top - middle))).sum())
+    return at_top if at_top >= near else 0  # near / 5 bins of 2 %, times five
 
 
 def stuck(values: Floats) -> bool:
@@ -45,5 +47,8 @@ def stuck(values: Floats) -> bool:
 
 def repeats(values: Floats) -> Bools:
     """(N,) True where a row (N, C) equals the row before in every value."""
-    same = (values[1:] == values[:-1]).all(axis=1)
-    return np.asarray(np.concatenate([[False], same]))
+    same = np.ones(len(values), np.bool_)
+    same[:1] = False
+    for column in values.T:
+        same[1:] &= column[1:] == column[:-1]
+    return same

@@ -94,6 +94,7 @@ class Table:
     metadata: tuple[tuple[str, str], ...] = ()
     stamps_s: Floats | None = None
     rate_hz: float | None = None
+    t0_s: float = 0.0
     start: datetime | None = None
     layout: str = ""
     decimal: str = "."

@@ -36,20 +36,20 @@ def find_rest(values: Floats, rate_hz: float) -> Rest:
     """
     size = max(8, round(0.25 * rate_hz))
     count = len(values) // size
-    with np.errstate(invalid="ignore"):
-        whole = _mean(values)
     if count < 2:
-        return Rest(whole, False)
-    blocks = values[: count * size].reshape(count, size, -1)
-    good = np.isfinite(blocks).all(axis=(1, 2))
-    if not good.any():
-        return Rest(whole, False)
-    means = blocks[good].mean(axis=1)
-    spreads = np.sqrt(blocks[good].var(axis=1).sum(axis=1))
+        return Rest(_mean(values), False)
+    blocks = [np.ascontiguousarray(c[: count * size]).reshape(count, size) for c in values.T]
+    means = np.stack([block.sum(axis=1) for block in blocks], axis=1) / size
+    squares = np.sum([np.einsum("bs,bs->b", block, block) for block in blocks], axis=0) / size
+    good = np.isfinite(squares)  # a NaN cell spoils its block alone
+    means, squares = means[good], squares[good]
     lengths = np.linalg.norm(means, axis=1)
+    spreads = np.sqrt(np.maximum(squares - lengths**2, 0))
+    if not spreads.size:
+        return Rest(_mean(values), False)
     quiet = (spreads < 0.05 * lengths) & (spreads <= 2 * np.quantile(spreads, 0.05) + 1e-12)
     if not quiet.any():
-        return Rest(whole, False)
+        return Rest(_mean(values), False)
     return Rest(np.median(means[quiet], axis=0), True)
 
 

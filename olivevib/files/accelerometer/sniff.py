@@ -37,6 +37,7 @@ class TextLayout:
     units: tuple[str, ...]
     metadata: tuple[tuple[str, str], ...]
     comment: str = ""
+    padded: bool = False  # blanks after separators
 
     def words(self) -> str:
         """The layout in words, shown to the technician."""
@@ -65,15 +66,19 @@ def sniff(
 ) -> TextLayout | None:
     """The layout of ``lines``, or None where no dialect makes columns of numbers of them.
 
-    The dialect is the one under which most cells of the last 200 lines are numbers or stamps in
-    rows of one width; the header is what stands before the first such row.
+    The dialect is the one under which most cells of the last lines are numbers or stamps in rows
+    of one width; the header is what stands before the first such row.
     """
     hints = _hints(lines)
     tail = [x for x in lines if x.strip() and not x.lstrip().startswith(COMMENTS)][-200:]
+    sample = tail[-1 :: -max(1, len(tail) // 30)]
+    present = {s for s in ("\t", ";", ",", "|", " ") if any(s in line for line in sample)} or {","}
     scored = [
-        (_score(d, tail), d)
+        (_score(d, sample), d)
         for d in _DIALECTS
-        if d.separator == (separator or d.separator) and d.decimal == (decimal or d.decimal)
+        if d.separator in present
+        and d.separator == (separator or d.separator)
+        and d.decimal == (decimal or d.decimal)
     ]
     if not tail or not scored:
         return None
@@ -140,7 +145,8 @@ def _layout(lines: list[str], encoding: str, dialect: Dialect, tail: list[str]) 
     metadata += tuple(("header mark", above[k].lstrip()[:1]) for k in sorted(used)[:1])
     marks = [x.lstrip()[0] for x in lines[first:] if x.lstrip().startswith(("#", ";", "%"))]
     comment = marks[0] if marks and marks[0] != dialect.separator else ""
-    return TextLayout(encoding, dialect, first, kinds, names, units, metadata, comment)
+    padded = any(cell[:1] == " " for row in rows for cell in row[1:])
+    return TextLayout(encoding, dialect, first, kinds, names, units, metadata, comment, padded)
 
 
 def _column_kinds(rows: list[str], width: int) -> str:
@@ -155,12 +161,12 @@ def _column_kinds(rows: list[str], width: int) -> str:
 
 def _first_row(lines: list[str], dialect: Dialect, kinds: str) -> int:
     """The first line that has the columns' kinds and is followed by another one (or the end)."""
-    good = [_is_row(dialect.kinds(dialect.split(line)), kinds) for line in lines]
     filled = [k for k, line in enumerate(lines) if line.strip()]
     for at, k in enumerate(filled):
-        following = filled[at + 1 : at + 4]
-        if good[k] and (not following or any(good[n] for n in following)):
-            return k
+        if _is_row(dialect.kinds(dialect.split(lines[k])), kinds):
+            following = [dialect.kinds(dialect.split(lines[n])) for n in filled[at + 1 : at + 4]]
+            if not following or any(_is_row(found, kinds) for found in following):
+                return k
     return len(lines)
 
 
@@ -215,7 +221,7 @@ _OTHER_SPLITS = (r"\t+", r"\s{2,}", r"\s*;\s*", r"\s*,\s*")
 
 def _all_units(cells: tuple[str, ...]) -> bool:
     """True for a row of units alone, as in ``s;g;g;g``; names such as ``t`` or ``g`` are few."""
-    filled = [c for c in cells if c]
+    filled = [c for c in cells if c.strip("-")]
     return len(filled) >= max(2, len(cells) - 1) and all(parse_unit(c) for c in filled)
 
 
@@ -227,7 +233,8 @@ def _metadata(lines: list[str], dialect: Dialect) -> tuple[tuple[str, str], ...]
         if not text:
             continue
         cells = [c.strip().strip('"') for c in dialect.split(text)]
-        if len(cells) > 1 and cells[0] and "=" not in cells[0] and ":" not in cells[0]:
+        spelled = dialect.separator == " " and (":" in text or "=" in text)
+        if len(cells) > 1 and cells[0] and not (spelled or "=" in cells[0] or ":" in cells[0]):
             found.append((cells[0].casefold(), " ".join(c for c in cells[1:] if c)))
             continue
         text = re.sub(r"^[^:=]*:\s*(?=[^:=]+=)", "", text)

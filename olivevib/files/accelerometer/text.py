@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,6 +14,8 @@ from olivevib.errors import Caution, InputError
 from olivevib.files.accelerometer.encoding import find_encoding
 from olivevib.files.accelerometer.record import SEPARATORS, Channel, ImportOptions, Table
 from olivevib.files.accelerometer.sniff import SNIFF_BYTES, TextLayout, lines_of, sniff
+
+_NEWLINE = re.compile(rb"\r\n|\n|\r")
 
 
 def read_text(data: bytes, options: ImportOptions, source: str) -> Table:
@@ -97,26 +100,23 @@ def _read_frame(data: bytes, layout: TextLayout, source: str) -> tuple[Any, int]
     import pandas as pd
 
     dialect = layout.dialect
-    encoding = layout.encoding
-    if encoding.startswith(("utf-16", "utf-32")):
-        data, encoding = data.decode(encoding, errors="replace").encode("utf-8"), "utf-8"
-    if not data.endswith((b"\n", b"\r")):
-        data = _without_cut_row(data, layout)
+    body, encoding, start = _body(data, layout)
+    stream = io.BytesIO(body)
+    stream.seek(start)
     try:
         frame = pd.read_csv(
-            io.BytesIO(data),
+            stream,
             sep=r"\s+" if dialect.separator == " " else dialect.separator,
             decimal=dialect.decimal,
             thousands=dialect.thousands or None,
             header=None,
             names=list(range(len(layout.kinds))),
             index_col=False,
-            skiprows=layout.first_row,
             comment=layout.comment or None,
             encoding=encoding,
             encoding_errors="replace",
             on_bad_lines="skip",
-            skipinitialspace=True,
+            skipinitialspace=layout.padded,
             low_memory=False,
             engine="c",
         )
@@ -126,14 +126,27 @@ def _read_frame(data: bytes, layout: TextLayout, source: str) -> tuple[Any, int]
             str(error).splitlines()[0] if str(error) else "",
             "Open it in an editor; name separator and decimal mark if the guess is wrong.",
         ) from error
-    return frame, _skipped(data, layout, len(frame))
+    return frame, _skipped(body, start, layout, len(frame))
 
 
-def _skipped(data: bytes, layout: TextLayout, rows: int) -> int:
+def _body(data: bytes, layout: TextLayout) -> tuple[bytes, str, int]:
+    """The file's bytes without a cut last row, their encoding, and where the data rows begin."""
+    encoding = "utf-8" if layout.encoding == "utf-8-sig" else layout.encoding
+    if encoding.startswith(("utf-16", "utf-32")):
+        data, encoding = data.decode(encoding, errors="replace").encode("utf-8"), "utf-8"
+    start = 3 if data.startswith(b"\xef\xbb\xbf") else 0
+    for _, end in zip(range(layout.first_row), _NEWLINE.finditer(data), strict=False):
+        start = end.end()
+    if not data.endswith((b"\n", b"\r")):
+        data = _without_cut_row(data, layout)
+    return data, encoding, start
+
+
+def _skipped(body: bytes, start: int, layout: TextLayout, rows: int) -> int:
     """How many lines of cells are missing from ``rows``; blank and comment lines do not count."""
-    if data.count(b"\n") - layout.first_row <= rows:
+    if body.count(b"\n", start) <= rows:
         return 0
-    lines = data.split(b"\n")[layout.first_row :]
+    lines = body[start:].split(b"\n")
     mark = layout.comment.encode() or b"\0"
     return max(0, sum(1 for x in lines if x.strip() and not x.lstrip().startswith(mark)) - rows)
 
@@ -150,13 +163,11 @@ def _channels(frame: Any, layout: TextLayout) -> Iterator[Channel]:
     rows = list(zip(layout.names, layout.units, layout.kinds, strict=True))
     for k, (name, unit, kind) in enumerate(rows):
         column = frame[k]
-        if kind == "n" and column.dtype.kind in "fiu":
-            values = column.to_numpy(dtype=np.float64)
-            empty = kind == "b" or np.isnan(values).all()
-            yield Channel(name, unit, values, bad=0 if empty else int(np.isnan(values).sum()))
-        elif kind == "n":
-            values = _numbers(column, layout)
-            yield Channel(name, unit, values, bad=int(np.isnan(values).sum()))
+        if kind == "n":
+            plain = column.dtype.kind in "fiu"
+            values = column.to_numpy(dtype=np.float64) if plain else _numbers(column, layout)
+            unread = int(np.isnan(values).sum())
+            yield Channel(name, unit, values, bad=unread if unread < values.size else 0)
         else:
             texts = column.astype(str).to_numpy(dtype=object)
             yield Channel(name, unit, np.full(len(texts), np.nan), text=texts)
