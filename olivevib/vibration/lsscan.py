@@ -59,8 +59,10 @@ class Scan:
         return min(1.0, single + crossings)
 
 
-def scan(t_s: Floats, values: Floats, top_hz: float, lost_freedom: int = 0) -> Scan:
-    """Scan t_s (N,), values (N, C) from 1/T to top_hz in steps of 1/(4T).
+def scan(
+    t_s: Floats, values: Floats, top_hz: float, lost_freedom: int = 0, span_s: float | None = None
+) -> Scan:
+    """Scan t_s (N,), values (N, C) from 1/T to top_hz in steps of 1/(4T); T: span_s where given.
 
     Floating mean, closed 2 x 2 normal equations (Zechmeister, Kürster, A&A 496 (2009) 577, doi
     10.1051/0004-6361:200811296). lost_freedom: columns already projected out of the values.
@@ -69,7 +71,7 @@ def scan(t_s: Floats, values: Floats, top_hz: float, lost_freedom: int = 0) -> S
     """
     n = t_s.size
     centred = values - values.mean(axis=0)
-    span = float(t_s[-1] - t_s[0]) * n / max(1, n - 1)
+    span = span_s or float(t_s[-1] - t_s[0]) * n / max(1, n - 1)
     step = 1.0 / (OVERSAMPLING * span)
     count = max(OVERSAMPLING + 1, int(np.floor(top_hz / step)) + 1)
     since = t_s - t_s.mean()

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from olivevib.arrays import Bools, Floats
-from olivevib.signals import Samples
+from olivevib.signals import Samples, fit_stamps
 from olivevib.vibration.clock import measured
-from olivevib.vibration.sway import sway_columns
+from olivevib.vibration.ridge import Ridge, camera_ridge, sensor_ridge
 
 NAMES = ("rest", "start-up", "steady", "shut-down", "decay")
 WHOLE = "whole"
@@ -25,6 +25,8 @@ class Phase:
     end_s: float
 
     def __post_init__(self) -> None:
+        if self.name not in (*NAMES, WHOLE):
+            raise ValueError(f"there is no phase {self.name!r}; use {', '.join(NAMES)}")
         if not (np.isfinite(self.start_s) and np.isfinite(self.end_s)):
             raise ValueError(f"phase {self.name!r} needs finite limits")
         if self.end_s <= self.start_s:
@@ -38,88 +40,194 @@ class Phase:
 
 @dataclass(frozen=True)
 class PhaseSettings:
-    """How phases are told apart: rolling window, thresholds of the rolling RMS."""
+    """How phases are told apart: thresholds of the rolling RMS and of the dominant frequency.
 
-    window_s: float = 0.3
-    hop_s: float = 0.05
-    on_share: float = 0.05  # of the 90th percentile
-    on_mads: float = 6.0  # scaled median absolute deviations above rest
-    steady_share: float = 0.5  # of the median while shaking
+    on_share of the 90th percentile, on_mads scaled median absolute deviations above rest: shaking.
+    steady_percent: the dominant frequency stays within that of its median. shortest_s: no
+    shaking, and no steady phase, is shorter.
+    """
+
+    on_share: float = 0.05
+    on_mads: float = 6.0
+    steady_percent: float = 2.0
     shortest_s: float = 0.5
 
 
+DEFAULTS = PhaseSettings()
+
+_CAMERA_WINDOW_S, _CAMERA_HOP_S = 1.0, 0.1
+_ONSET_WINDOW_S = 0.3
+_SENSOR_WINDOW_S, _SENSOR_HOP_S = 0.3, 0.02
+_SENSOR_ONSET_S = 0.1
+_SENSOR_BAND_HZ = (3.0, 100.0)
+_SENSOR_BLOCK_HZ = 800.0
+
+
+@dataclass(frozen=True)
+class _Track:
+    """How a ridge is read: least tolerance of its frequency; how far the first and last steady
+    window's middle lies inside the steady phase.
+    """
+
+    tolerance_hz: float
+    reach_s: float
+
+
+_CAMERA_TRACK = _Track(0.15, 0.2)
+_SENSOR_TRACK = _Track(0.1, 0.0)
+_QUIET = 0.25  # of the 90th percentile: below, a window may be rest
+
+
 def find_phases(
-    motion: Mapping[int, Samples], sway_hz: float, settings: PhaseSettings = PhaseSettings()
+    motion: Mapping[int, Samples], sway_hz: float, settings: PhaseSettings = DEFAULTS
 ) -> tuple[Phase, ...]:
     """Phases from camera displacement alone; () without markers or samples.
 
-    The rolling RMS of all markers (it survives aliasing) tells shaking from rest. A record that
-    shakes from end to end is one steady phase; one that never shakes is one rest.
+    The rolling RMS of all markers (it survives aliasing) tells shaking from rest; the dominant
+    frequency as the camera sees it tells steady from start-up and shut-down, aliased or not. A
+    record that shakes from end to end has no rest; one that never shakes is one rest. The end of
+    a shaking that dies at a frequency of its own is the decay.
     """
-    times, rms = rolling_rms(motion, sway_hz, settings)
-    if times.size < 2:
+    parts = [motion[m] for m in sorted(motion) if motion[m].t_s.size > 1]
+    if not parts:
         return ()
-    start, end = _limits(motion)
-    top, low = np.percentile(rms, [90, 5])
-    if low > 0.3 * top:
-        return (Phase("steady", start, end),)
-    on = _longest(rms > _threshold(rms, settings))
-    if on is None or (on.stop - on.start) * settings.hop_s < settings.shortest_s:
+    limits = min(float(s.t_s[0]) for s in parts), max(float(s.t_s[-1]) for s in parts)
+    ridge = camera_ridge(parts, sway_hz, _CAMERA_WINDOW_S, _CAMERA_HOP_S)
+    short = camera_ridge(parts, sway_hz, _ONSET_WINDOW_S, _CAMERA_HOP_S / 2)
+    if ridge.t_s.size < 3:
+        return (Phase("steady", *limits),) if limits[1] > limits[0] else ()
+    return _phases(short, ridge, limits, _CAMERA_TRACK, settings)
+
+
+def find_sensor_phases(sensor: Samples, settings: PhaseSettings = DEFAULTS) -> tuple[Phase, ...]:
+    """Phases from an accelerometer (any unit), on its own clock.
+
+    Limits of the steady phase are good to some 30 ms; the onset of shaking is found late and its
+    end early by 0.1-0.2 s, because a machine that turns slowly hardly accelerates.
+    """
+    t_s, values = measured(sensor)
+    if t_s.size < 64:
+        return ()
+    even_t, even = _even_blocks(t_s, values)
+    ridge = sensor_ridge(even_t, even, _SENSOR_BAND_HZ, _SENSOR_WINDOW_S, _SENSOR_HOP_S)
+    short = sensor_ridge(even_t, even, _SENSOR_BAND_HZ, _SENSOR_ONSET_S, _SENSOR_HOP_S / 2)
+    if ridge.t_s.size < 3:
+        return ()
+    return _phases(short, ridge, (float(t_s[0]), float(t_s[-1])), _SENSOR_TRACK, settings)
+
+
+def _even_blocks(t_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """An even record of at most some 800 Hz, by means of blocks; gaps hold the last value.
+
+    Only for finding phases, where a held value in a gap moves nothing by more than the gap.
+    """
+    fit = fit_stamps(t_s)
+    count = int(fit.sequence[-1]) + 1
+    held = np.maximum.accumulate(np.bincount(fit.sequence, np.arange(t_s.size), count))
+    even = values[held.astype(np.int64)]
+    block = max(1, int(fit.rate_hz / _SENSOR_BLOCK_HZ))
+    n = count // block * block
+    times = t_s[0] + (np.arange(n // block) * block + (block - 1) / 2) / fit.rate_hz
+    return times, even[:n].reshape(-1, block, values.shape[1]).mean(axis=1)
+
+
+def _phases(
+    short: Ridge,
+    ridge: Ridge,
+    limits: tuple[float, float],
+    track: _Track,
+    settings: PhaseSettings,
+) -> tuple[Phase, ...]:
+    start, end = limits
+    shaking = _shaking(short, limits, settings)
+    if shaking is None:
         return (Phase("rest", start, end),)
-    shaking = rms[on]
-    steady = _longest(shaking > settings.steady_share * np.median(shaking))
-    first = on.start + (steady.start if steady else 0)
-    last = on.start + (steady.stop - 1 if steady else shaking.size - 1)
-    limits = (start, times[on.start], times[first], times[last], times[on.stop - 1], end)
-    return _named(limits, ("rest", "start-up", "steady", "shut-down", "rest"))
+    on, off, fade = shaking
+    inside = (ridge.t_s >= on) & (ridge.t_s <= off) & np.isfinite(ridge.f_hz)
+    steady = _steady(ridge, inside, track.tolerance_hz, settings)
+    if steady is None:
+        return _named((start, on, off, end), ("rest", "start-up", "rest"))
+    first = float(np.clip(ridge.t_s[steady.start] - track.reach_s, on, off))
+    last = float(np.clip(ridge.t_s[steady.stop - 1] + track.reach_s, on, off))
+    at_ends = ridge.t_s[steady.start] - start < ridge.window_s, end - last < ridge.window_s
+    first = start if at_ends[0] and on == start else first
+    last = end if at_ends[1] and off == end else last
+    decay, stop = _decay(ridge, last, off, fade, track.tolerance_hz)
+    cuts = (start, on, first, last, decay, stop, end)
+    return _named(cuts, ("rest", "start-up", "steady", "shut-down", "decay", "rest"))
 
 
-def rolling_rms(
-    motion: Mapping[int, Samples], sway_hz: float, settings: PhaseSettings
-) -> tuple[Floats, Floats]:
-    """Times (K,) and rolling RMS (K,) of the vector, the sway taken out, all markers together."""
-    start, end = _limits(motion)
-    half = settings.window_s / 2
-    times = np.arange(start + half, end - half + 1e-9, settings.hop_s)
-    total = np.zeros(times.size)
-    for samples in motion.values():
-        t_s, values = measured(samples)
-        if t_s.size < 4:
-            continue
-        total += _rolling_power(t_s, _without_sway(t_s, values, sway_hz), times, half)
-    return times, np.sqrt(total)
+def _shaking(
+    short: Ridge, limits: tuple[float, float], settings: PhaseSettings
+) -> tuple[float, float, float] | None:
+    """Start and end of the longest shaking and when all has faded; None: there is none.
+
+    A record without rest shakes throughout.
+    """
+    known = np.isfinite(short.rms)
+    rms = short.rms[known]
+    if not rms.size:
+        return None
+    top, low = np.percentile(rms, [90, 5])
+    if low > _QUIET * top:
+        return limits[0], limits[1], limits[1]
+    noise = _rest_level(rms, settings)
+    level = min(max(noise, settings.on_share * top), _QUIET * top)
+    filled = np.interp(short.t_s, short.t_s[known], rms)
+    run = _longest(filled > level)
+    if run is None or (run.stop - run.start) * short.hop_s < settings.shortest_s:
+        return None
+    quiet = np.flatnonzero(filled[run.stop :] <= noise)
+    fade = run.stop + int(quiet[0]) if quiet.size else short.t_s.size
+    on = limits[0] if run.start == 0 else float(short.t_s[run.start])
+    off = limits[1] if run.stop == short.t_s.size else float(short.t_s[run.stop - 1])
+    return on, off, max(off, limits[1] if fade == short.t_s.size else float(short.t_s[fade]))
 
 
-def _limits(motion: Mapping[int, Samples]) -> tuple[float, float]:
-    ends = [(s.t_s[0], s.t_s[-1]) for s in motion.values() if s.t_s.size]
-    if not ends:
-        return 0.0, 0.0
-    return float(min(a for a, _ in ends)), float(max(b for _, b in ends))
-
-
-def _without_sway(t_s: Floats, values: Floats, sway_hz: float) -> Floats:
-    columns = sway_columns(t_s, sway_hz)
-    if columns is None:
-        return np.asarray(values - values.mean(axis=0))
-    return np.asarray(values - columns @ (columns.T @ values))
-
-
-def _rolling_power(t_s: Floats, values: Floats, times: Floats, half: float) -> Floats:
-    """Mean square of the vector within half a window of each time; 0 where nothing was seen."""
-    sums = np.concatenate([[0.0], np.cumsum(np.sum(values**2, axis=1))])
-    first, last = np.searchsorted(t_s, times - half), np.searchsorted(t_s, times + half)
-    count = last - first
-    return np.asarray((sums[last] - sums[first]) / np.maximum(count, 1))
-
-
-def _threshold(rms: Floats, settings: PhaseSettings) -> float:
-    top = float(np.percentile(rms, 90))
-    quiet = rms[rms < 0.25 * top]
-    if not quiet.size:
-        return settings.on_share * top
+def _rest_level(rms: Floats, settings: PhaseSettings) -> float:
+    """Above this nothing is rest any more: from the quietest fifth of the record."""
+    quiet = rms[rms <= np.percentile(rms, 20)]
     middle = float(np.median(quiet))
     mad = 1.4826 * float(np.median(np.abs(quiet - middle)))
-    return max(middle + settings.on_mads * mad, settings.on_share * top)
+    return middle + settings.on_mads * max(mad, 0.05 * middle)
+
+
+def _steady(ridge: Ridge, on: Bools, tolerance_hz: float, settings: PhaseSettings) -> slice | None:
+    """The longest run of windows whose dominant frequency stays at its median while strong."""
+    if not on.any():
+        return None
+    strong = on & (ridge.rms > 0.5 * np.median(ridge.rms[on]))
+    if not strong.any():
+        return None
+    middle = float(np.median(ridge.f_hz[strong]))
+    allowed = max(tolerance_hz, settings.steady_percent / 100 * middle)
+    run = _longest(on & (np.abs(ridge.f_hz - middle) <= allowed))
+    if run is None or (run.stop - run.start) * ridge.hop_s < settings.shortest_s:
+        return None
+    return run
+
+
+def _decay(
+    ridge: Ridge, from_s: float, off_s: float, fade_s: float, tolerance_hz: float
+) -> tuple[float, float]:
+    """Start and end of the free decay: the last windows that die at one frequency.
+
+    Without one, both are where shaking ended: an accelerometer hears a slow decay below the
+    level of shaking, so the search goes on until all has faded.
+    """
+    after = np.flatnonzero((ridge.t_s > from_s) & (ridge.t_s <= fade_s) & (ridge.rms > 0))
+    if after.size < 4:
+        return off_s, off_s
+    f, rms = ridge.f_hz[after], ridge.rms[after]
+    middle = float(np.median(f[after.size // 2 :]))
+    alike = np.abs(f - middle) <= max(tolerance_hz, 0.15 * middle)
+    dying = np.concatenate([rms[1:] < 1.05 * rms[:-1], [True]])
+    other = np.flatnonzero(~(alike & dying))
+    first = int(other[-1]) + 1 if other.size else 0
+    lasts = (after.size - first) * ridge.hop_s
+    if after.size - first < 3 or lasts < 1.0 / middle:
+        return off_s, off_s
+    return float(ridge.t_s[after[first]]), fade_s
 
 
 def _longest(flags: Bools) -> slice | None:
