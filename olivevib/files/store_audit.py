@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import h5py
 from h5py import h5d, h5g, h5l, h5o, h5s, h5t, h5z
 
 MAX_OBJECTS = 2000
@@ -112,6 +111,3 @@ def _audit_type(kind: Any, where: str) -> None:
 
 def _text(name: bytes) -> str:
     return name.decode("utf-8", "replace")
-
-
-assert h5py.version.hdf5_version_tuple >= (1, 10)
