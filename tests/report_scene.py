@@ -10,9 +10,10 @@ from olivevib.comparison import Comparison, LineDifference, Verdict
 from olivevib.errors import Caution
 from olivevib.geometry import CameraModel, StereoRig, rotation_from_vector
 from olivevib.reconstruction.trajectory import Trajectory
-from olivevib.report.content import CalibrationView, ReportContent
+from olivevib.report.content import ReportContent
 from olivevib.signals import State
 from olivevib.tracking import Track
+from olivevib.trial.records.calibration import CalibrationRecord
 from olivevib.vibration import (
     CandidateMotion,
     Line,
@@ -197,7 +198,7 @@ def comparison() -> Comparison:
     )  # fmt: skip
 
 
-def calibration_view() -> CalibrationView:
+def calibration() -> CalibrationRecord:
     """Residuals over both pictures and distance errors of a board with 25 corners."""
     rng = np.random.default_rng(9)
     sides = [
@@ -206,11 +207,18 @@ def calibration_view() -> CalibrationView:
         for _ in range(2)
     ]  # fmt: skip
     true = rng.choice([54.0, 76.4, 108.0, 152.7, 194.7], 800)
-    return CalibrationView(
-        sides[0], sides[1], np.column_stack([true, rng.normal(0, 0.35, 800)]),
-        {"board": "charuco:4x5,square=54", "views": 62, "camera_lag_ms": -28.0},
-        "Distances on unused frames are right to 0.35 mm.",
-    )  # fmt: skip
+    return CalibrationRecord(
+        source="board",
+        board="charuco:4x5,square=54,marker=40.5,dict=DICT_4X4_1000,inverted",
+        right_offset_s=-0.0281,
+        right_offset_sigma_s=0.0004,
+        verdict="Distances on unused frames are right to 0.35 mm.",
+        residuals_left=sides[0],
+        residuals_right=sides[1],
+        holdout_mm=np.column_stack([true, rng.normal(0, 0.35, 800)]),
+        facts={"views": 62, "bow_mm": -0.11},
+        dropped_views=("view 12: blurred", "view 40: moved"),
+    )
 
 
 def summary(path: Trajectory, lines: tuple[Line, ...]) -> dict[str, Any]:
@@ -243,6 +251,7 @@ def summary(path: Trajectory, lines: tuple[Line, ...]) -> dict[str, Any]:
             "holdout_rms_mm": 0.35, "holdout_rms_percent": 0.38,
         },
         "timing": {
+            "right_offset_source": "calibration",
             "right_offset_s": 0.00912, "right_offset_sigma_s": 5e-5, "reference_row": 360.0,
             "left": {"row_time_s": 27.8e-6, "row_time_sigma_s": 4e-7, "source": "led"},
             "right": {"row_time_s": 0.0, "row_time_sigma_s": None, "source": "unknown"},
@@ -279,13 +288,12 @@ def content(
         "summary": summary(path, spectra.lines),
         "places": {i: PLACES.get(i, f"branch {i}") for i in ids},
         "rig": rig(),
-        "calibration": calibration_view(),
+        "calibration": calibration(),
         "tracks": tracks(path),
         "recordings": {side: recording(side) for side in ("left", "right")},
-        "clock_source": "calibration",
         "trajectory": path,
         "vibration": vibration(path, spectra),
-        "comparison": comparison(),
+        "comparisons": (comparison(),),
         "cautions": (Caution("row-time-unknown", "The right camera's row time is not known.",
                              "Measure it once with an LED: olivevib rowtime FILE --led HZ"),),
         "provenance": {"command": "olivevib report 2026-11-20_T04", "olivevib": "0.1.0",

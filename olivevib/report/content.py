@@ -6,40 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
-from olivevib.arrays import Floats, floats
 from olivevib.comparison import Comparison
 from olivevib.errors import Caution
 from olivevib.geometry import StereoRig
 from olivevib.reconstruction.trajectory import Trajectory
 from olivevib.report.clean import clean
 from olivevib.tracking import Track
+from olivevib.trial.records.calibration import CalibrationRecord
 from olivevib.vibration import Line, Phase, Spectrum, Vibration
-
-_NO_RESIDUALS = np.empty((0, 4))
-_NO_DISTANCES = np.empty((0, 2))
-
-
-@dataclass(frozen=True)
-class CalibrationView:
-    """What the stored calibration says of itself.
-
-    left, right (K, 4): pixel position u, v and residual du, dv of each board point. holdout
-    (D, 2): true distance and error of each board distance on frames the fit never saw, mm.
-    facts: key (with unit suffix) and value; verdict: one sentence.
-    """
-
-    left: Floats = field(default_factory=lambda: _NO_RESIDUALS)
-    right: Floats = field(default_factory=lambda: _NO_RESIDUALS)
-    holdout_mm: Floats = field(default_factory=lambda: _NO_DISTANCES)
-    facts: Mapping[str, Any] = field(default_factory=dict)
-    verdict: str = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "left", floats("left", self.left, (None, 4)))
-        object.__setattr__(self, "right", floats("right", self.right, (None, 4)))
-        object.__setattr__(self, "holdout_mm", floats("holdout_mm", self.holdout_mm, (None, 2)))
 
 
 @dataclass(frozen=True)
@@ -49,8 +23,7 @@ class ReportContent:
     record: sections of trial.toml (session, tree, machine, markers, …) as plain values. summary:
     the content of ``show --json``. places: words for each marker id. provenance: versions,
     settings and hashes as plain text, ``command`` among them. recordings: for left and right what
-    the stored recording says of itself (rate, jitter, drops). clock_source: where the offset
-    between the cameras comes from.
+    the stored recording says of itself (rate, jitter, drops).
     """
 
     name: str
@@ -59,13 +32,12 @@ class ReportContent:
     places: Mapping[int, str] = field(default_factory=dict)
     simulated: bool = False
     rig: StereoRig | None = None
-    calibration: CalibrationView | None = None
+    calibration: CalibrationRecord | None = None
     tracks: tuple[Track, ...] = ()
     recordings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    clock_source: str = ""
     trajectory: Trajectory | None = None
     vibration: Vibration | None = None
-    comparison: Comparison | None = None
+    comparisons: tuple[Comparison, ...] = ()
     cautions: tuple[Caution, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import jinja2
 
+from olivevib.comparison import Comparison
 from olivevib.progress import Tick, silent
 from olivevib.report import tables
 from olivevib.report.clean import clean
@@ -25,6 +26,7 @@ class Section:
     title: str
 
 
+MOST_DROPPED = 20  # dropped calibration views that are named
 MOST_PAIRS = 66  # distances listed as a table: 12 markers
 
 SECTIONS = (
@@ -78,6 +80,7 @@ def render_page(content: ReportContent, tick: Tick = silent) -> str:
         record=tables.record_sections(content),
         rig=tables.rig_pairs(content),
         cameras=tables.camera_columns(content),
+        dropped_views=_dropped(content),
         calibration_verdict=clean(content.calibration.verdict) if content.calibration else "",
         timing=tables.timing_pairs(content),
         clocks=tables.camera_clocks(content),
@@ -85,9 +88,11 @@ def render_page(content: ReportContent, tick: Tick = silent) -> str:
         distances=_distances(content),
         states=[s.word for s in State],
         state_rows=tables.state_rows(content),
-        comparison=tables.comparison_pairs(content),
-        comparison_lines=tables.comparison_lines(content),
-        comparison_words=_comparison_words(content),
+        comparisons=[
+            (_words(c), tables.comparison_pairs(content, c), tables.comparison_lines(c))
+            for c in content.comparisons
+        ],
+        not_compared=_not_compared(content),
         frame=clean(content.trajectory.frame) if content.trajectory else "",
         phases=[
             (clean(p.name, 30), f"{p.start_s:.2f} – {p.end_s:.2f}\u00a0s") for p in content.phases
@@ -110,6 +115,13 @@ def _heading(content: ReportContent) -> list[str]:
     return out
 
 
+def _dropped(content: ReportContent) -> list[str]:
+    """Views that the calibration left out, and why; the first twenty."""
+    dropped = content.calibration.dropped_views if content.calibration else ()
+    more = [f"and {len(dropped) - MOST_DROPPED} more"] if len(dropped) > MOST_DROPPED else []
+    return [clean(line, 160) for line in dropped[:MOST_DROPPED]] + more
+
+
 def _distances(content: ReportContent) -> list[tuple[str, str, str]]:
     """The table of distances, where it is short enough to be read."""
     pairs = pair_distances(content.trajectory) if content.trajectory is not None else []
@@ -126,9 +138,12 @@ def _reasons(content: ReportContent) -> list[tuple[str, str]]:
     return [("all" if len(ids) == every else ", ".join(ids), why) for why, ids in found.items()]
 
 
-def _comparison_words(content: ReportContent) -> str:
-    if content.comparison is None:
-        stage = (content.summary.get("stages") or {}).get("compare") or {}
-        reason = clean(stage.get("reason") or "")
-        return "Not compared" + (f": {reason}." if reason else ".")
-    return f"{content.comparison.verdict}: {clean(content.comparison.reason)}."
+def _words(comparison: Comparison) -> str:
+    reason = clean(comparison.reason).rstrip(".")
+    return f"{clean(comparison.sensor, 60)} — {comparison.verdict}: {reason}."
+
+
+def _not_compared(content: ReportContent) -> str:
+    stage = (content.summary.get("stages") or {}).get("compare") or {}
+    reason = clean(stage.get("reason") or "").rstrip(".")
+    return "Not compared" + (f": {reason}." if reason else ".")

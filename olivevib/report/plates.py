@@ -9,6 +9,7 @@ import numpy as np
 
 from olivevib.progress import Tick, silent
 from olivevib.report import figures
+from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
 from olivevib.report.verdict import strongest
 from olivevib.report.words import number
@@ -144,14 +145,20 @@ def _quality(content: ReportContent) -> Iterator[_Job]:
         yield ("seen", _SEEN, job)
     if path is not None and np.isfinite(path.sigma_xyz_mm).any():
         yield ("sigma", _SIGMA, lambda: figures.sigmas(path, names))
-    if view is not None and rig is not None and len(view.left) and len(view.right):
+    if (
+        view is not None
+        and rig is not None
+        and len(view.residuals_left)
+        and len(view.residuals_right)
+    ):
         sizes = {"left": rig.left.size_px, "right": rig.right.size_px}
         yield ("calibration", _RESIDUALS, lambda: figures.residual_map(view, sizes))
     if view is not None and len(view.holdout_mm) > 1:
         yield ("calibration", _HOLDOUT, lambda: figures.holdout(view))
-    comparison = content.comparison
-    if comparison is not None and np.isfinite(comparison.optical_mm).any():
-        yield ("comparison", _SENSOR, lambda: figures.overlay(comparison))
+    for number_of, comparison in enumerate(content.comparisons):
+        if np.isfinite(comparison.optical_mm).any():
+            caption = f"{clean(comparison.sensor, 60)}: {_SENSOR}"
+            yield ("comparison", caption, _bound(figures.overlay, comparison, number_of))
 
 
 def sizes_mm(line: Line) -> float:
@@ -199,6 +206,6 @@ _SIGMA = (
 _RESIDUALS = "What the calibration leaves over at each board point, as needles."
 _HOLDOUT = "Known distances of the board, measured on frames that the calibration never saw."
 _SENSOR = (
-    "The displacement that the accelerometer predicts at the camera's own instants, and what the"
+    "the displacement that the accelerometer predicts at the camera's own instants, and what the"
     " camera saw. Left: the stretch that moves most; right: the difference over the whole record."
 )

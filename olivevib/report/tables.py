@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from olivevib.comparison import Comparison
 from olivevib.geometry import CameraModel
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
@@ -73,7 +74,7 @@ def marker_rows(content: ReportContent) -> list[MarkerRow]:
                 id=marker_id,
                 place=clean(content.places.get(marker_id, "")) or NOT_KNOWN,
                 seen=percent(marker.get("seen_fraction")),
-                frequency="" if listed else measure(hz, "Hz", sigma),
+                frequency="" if listed and hz is None else measure(hz, "Hz", sigma),
                 status=clean(marker.get("frequency_status") or NOT_KNOWN),
                 candidates=_candidates(listed, line),
                 amplitude=(x, y, z),
@@ -163,9 +164,17 @@ def rig_pairs(content: ReportContent) -> list[Pair]:
         ("distances on left-out views, rms error", measure(mm, "mm", digits=3)),
         ("the same, relative", measure(share, "%", digits=3)),
     ]
-    if content.calibration is not None:
-        pairs += [fact(k, v) for k, v in content.calibration.facts.items()]
-    return pairs
+    record = content.calibration
+    if record is None:
+        return pairs
+    lag = -record.right_offset_s  # the right camera is late by this much
+    return [
+        ("calibrated from", clean(record.source, 40) or NOT_KNOWN),
+        ("board", clean(record.board, 80) or NOT_KNOWN),
+        *pairs,
+        ("right camera late by, in the calibration", seconds(lag, record.right_offset_sigma_s)),
+        *(fact(k, v) for k, v in record.facts.items()),
+    ]
 
 
 def camera_columns(content: ReportContent) -> list[tuple[str, str, str]]:
@@ -206,7 +215,7 @@ def timing_pairs(content: ReportContent) -> list[Pair]:
     offset, sigma = timing.get("right_offset_s"), timing.get("right_offset_sigma_s")
     row = timing.get("reference_row")
     at = "" if row is None else f", at raw row {number(float(row))}"
-    source = content.clock_source
+    source = timing.get("right_offset_source")
     came = f" (source: {clean(source, 40)})" if source else ""
     value = "not known, taken as 0\u00a0s" if source == "unknown" else seconds(offset, sigma) + came
     return [*_rate(content), (f"to add to the right camera's stamps{at}", value)]
@@ -227,23 +236,18 @@ def _clock(content: ReportContent, side: str) -> list[Pair]:
     elif source == "global":
         value = "0\u00a0s: all rows at once"
     pairs = [("time from row to row", value), ("its source", source)]
-    recording = content.recordings.get(side)
-    if recording is None:
+    if not content.recordings:
         return pairs
-    get = recording.get
+    get = content.recordings.get(side, {}).get
+    counts = "; ".join(clean(get(k, "?"), 12) for k in ("frames", "dropped", "damaged"))
     return [
-        (
-            "recording",
-            f"{clean(get('video', NOT_KNOWN), 60)} ({clean(get('codec', NOT_KNOWN), 20)})",
-        ),
+        ("recording", clean(get("video") or NOT_KNOWN, 60)),
+        ("codec", clean(get("codec") or NOT_KNOWN, 20)),
         ("frame rate by the stamps", measure(get("rate_hz"), "frames/s", get("rate_sigma_hz"))),
         ("stamps from", clean(get("stamp_kind") or NOT_KNOWN, 30)),
         ("scatter of the stamps, rms", seconds(get("jitter_s"))),
         ("largest distance from an even clock", seconds(get("worst_s"))),
-        (
-            "frames; dropped; damaged",
-            "; ".join(str(get(k)) for k in ("frames", "dropped", "damaged")),
-        ),
+        ("frames; dropped; damaged", counts),
         *pairs,
     ]
 
@@ -274,11 +278,8 @@ def state_rows(content: ReportContent) -> list[tuple[str, list[str]]]:
     return out
 
 
-def comparison_pairs(content: ReportContent) -> list[Pair]:
+def comparison_pairs(content: ReportContent, c: Comparison) -> list[Pair]:
     """Camera against accelerometer, each number with its sigma."""
-    c = content.comparison
-    if c is None:
-        return []
     return [
         ("marker and sensor", f"{content.marker_name(c.marker)}; {clean(c.sensor, 80)}"),
         ("sensor's stamp less the trial clock", seconds(c.clock_offset_s, c.clock_offset_sigma_s)),
@@ -294,10 +295,10 @@ def _r(value: float) -> str:
     return number(value, 4) if np.isfinite(value) else NOT_KNOWN
 
 
-def comparison_lines(content: ReportContent) -> list[tuple[str, str, str, str, str]]:
+def comparison_lines(comparison: Comparison) -> list[tuple[str, str, str, str, str]]:
     """Each common line: frequency, camera, sensor, their difference, phase."""
     out = []
-    for each in content.comparison.lines if content.comparison is not None else ():
+    for each in comparison.lines:
         sigma = float(np.hypot(each.optical_sigma_m_s2, each.sensor_sigma_m_s2))
         out.append((
             measure(each.f_hz, "Hz"),

@@ -101,10 +101,11 @@ def _trust(content: ReportContent) -> str:
             "Distances on calibration views that the fit never saw are right to"
             f" {measure(mm, 'mm', digits=2)} ({measure(share, '%', digits=2)}) rms"
         )
-    if content.comparison is None:
+    if not content.comparisons:
         parts.append("there is no accelerometer to compare with")
     else:
-        parts.append(_AGREEMENT[content.comparison.verdict])
+        verdicts = dict.fromkeys(c.verdict for c in content.comparisons)
+        parts.append(", ".join(_AGREEMENT[v] for v in verdicts))
     n = len(content.cautions)
     parts.append("no warning was raised" if n == 0 else f"{count(n, 'warning')} to read below")
     return "; ".join(parts) + "."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from olivevib.report.figures.boxes import boxes
 from olivevib.report.figures.distances import Distance, distances, pair_distances
 from olivevib.report.figures.frequency import frequencies
 from olivevib.report.figures.motion import Window, time_series, whole
@@ -17,6 +18,7 @@ __all__ = [
     "MOST_ACROSS",
     "Distance",
     "Window",
+    "boxes",
     "describe",
     "distances",
     "frequencies",

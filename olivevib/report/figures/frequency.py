@@ -64,5 +64,5 @@ def _line(ax: Axes, row: int, line: Line) -> None:
         sigma = line.f_sigma_hz if np.isfinite(line.f_sigma_hz) else None
         sure = line.status in (LineStatus.DIRECT, LineStatus.CONFIRMED)
         face = colour if sure else "none"
-        ax.errorbar(line.f_hz, row, xerr=sigma, fmt="o", ms=5, mfc=face, mec=colour,
+        ax.errorbar(line.f_hz, row, xerr=sigma, fmt="o", color=colour, ms=5, mfc=face, mec=colour,
                     ecolor=colour, elinewidth=1, capsize=2)  # fmt: skip

@@ -121,7 +121,6 @@ def _frame(grid: Sequence[Sequence[Axes]]) -> None:
             ax.grid(axis="y")
             ax.locator_params(axis="y", nbins=4)
             ax.locator_params(axis="x", nbins=6, prune="upper")
-            first, last = k == 0, r == len(grid) - 1
-            ax.tick_params(labelleft=first, left=first, labelbottom=last, bottom=last)
+            canvas.label_ticks(ax, left=k == 0, bottom=r == len(grid) - 1)
     for ax in grid[-1]:
         ax.set_xlabel("trial clock, s")

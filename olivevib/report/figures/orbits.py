@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from olivevib.arrays import Floats
 from olivevib.reconstruction.trajectory import Trajectory
@@ -50,8 +51,9 @@ def orbits(
                 down = -1 if plane[1] == "y" and trajectory.frame == "left camera" else 1
                 grid[r][c].set_xlim(-reach_mm, reach_mm)
                 grid[r][c].set_ylim(-reach_mm * down, reach_mm * down)
-                first, last = c == 0, r == 2
-                grid[r][c].tick_params(labelleft=first, left=first, labelbottom=last, bottom=last)
+                canvas.label_ticks(grid[r][c], left=c == 0, bottom=r == 2)
+                if c > 0:
+                    grid[r][c].yaxis.set_major_locator(NullLocator())
             grid[0][c].set_title(_two_lines(names[marker_id]), fontsize=7, pad=3)
         for r, (_, up) in enumerate(PLANES):
             over = PLANES[r][0]

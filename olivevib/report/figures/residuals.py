@@ -9,13 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from olivevib.arrays import Floats
-from olivevib.report.content import CalibrationView
 from olivevib.report.figures import canvas
+from olivevib.trial.records.calibration import CalibrationRecord
 
 
-def residual_map(view: CalibrationView, sizes_px: Mapping[str, tuple[int, int]]) -> str:
+def residual_map(record: CalibrationRecord, sizes_px: Mapping[str, tuple[int, int]]) -> str:
     """Residuals of all board points in both pictures, as needles drawn to one enlarged scale."""
-    everything = np.concatenate([view.left, view.right])
+    everything = np.concatenate([record.residuals_left, record.residuals_right])
     typical = float(np.sqrt(np.mean(np.sum(everything[:, 2:] ** 2, axis=1)))) or 1e-9
     widest = max(sizes_px["left"][0], sizes_px["right"][0])
     gain = _round_gain(0.018 * widest / typical)
@@ -27,7 +27,7 @@ def residual_map(view: CalibrationView, sizes_px: Mapping[str, tuple[int, int]])
             figure, 1, 2, margins_in=(0.55, 0.1, 0.42, 0.42), gaps_in=(0.5, 0)
         )[0]
         for ax, side in zip(row, ("left", "right"), strict=True):
-            points = view.left if side == "left" else view.right
+            points = record.residuals_left if side == "left" else record.residuals_right
             colour = canvas.LEFT if side == "left" else canvas.RIGHT
             rms = float(np.sqrt(np.mean(points[:, 2:] ** 2))) if len(points) else float("nan")
             _needles(ax, points, gain, colour)
@@ -57,9 +57,9 @@ def _needles(ax: Axes, points: Floats, gain: float, colour: str, most: int = 150
     canvas.dots(ax, p[:, 0], p[:, 1], 1.2, canvas.INK)
 
 
-def holdout(view: CalibrationView) -> str:
+def holdout(record: CalibrationRecord) -> str:
     """Errors of known distances on frames that the calibration never saw."""
-    true, error = view.holdout_mm.T
+    true, error = record.holdout_mm.T
 
     def paint(figure: Figure) -> None:
         left, right = canvas.rows_and_columns(

@@ -21,7 +21,7 @@ def overlay_window(comparison: Comparison, wanted_s: float = 1.5) -> tuple[float
     return start, start + wanted_s
 
 
-def overlay(comparison: Comparison) -> str:
+def overlay(comparison: Comparison, part: int = 0) -> str:
     """Left: a stretch with both, axis by axis. Right: camera less sensor over the whole record."""
     window = overlay_window(comparison)
 
@@ -54,7 +54,7 @@ def overlay(comparison: Comparison) -> str:
                    ("camera", {"color": canvas.INK, "marker": "o", "lw": 0, "ms": 3})]  # fmt: skip
         canvas.key(figure, 0.6, 0.14, entries)
 
-    return canvas.draw("sensor", "Camera and accelerometer", 3.7, paint)
+    return canvas.draw(f"sensor{part}", "Camera and accelerometer", 3.7, paint)
 
 
 def _reach(*values: Floats) -> float:

@@ -61,13 +61,11 @@ def spectrum_rows(
             figure, len(ids), 3, margins_in=(0.6, 0.15, 0.4, 0.4), gaps_in=(0.2, 0.26)
         )
         top, bottom = _limits(spectrum, ids, kind)
-        for r, (row, marker_id) in enumerate(zip(grid, ids, strict=True)):
+        for row, marker_id in zip(grid, ids, strict=True):
             m = int(np.flatnonzero(spectrum.ids == marker_id)[0])
             for k, ax in enumerate(row):
                 _panel(ax, spectrum, (m, k), kind)
                 ax.set_ylim(bottom, top)
-                first, last = k == 0, r == len(ids) - 1
-                ax.tick_params(labelleft=first, left=first, labelbottom=last, bottom=last)
         lines = dict(zip(spectrum.ids.tolist(), spectrum.lines, strict=True))
         canvas.row_names(figure, grid, [f"{names[i]} — {describe(lines[i])}" for i in ids])
         unit = unit_text(spectrum.unit)
@@ -111,9 +109,10 @@ def _panel(ax: Axes, spectrum: Spectrum, at: tuple[int, int], kind: str) -> None
 def _frame(grid: Sequence[Sequence[Axes]]) -> None:
     for ax in grid[-1]:
         ax.set_xlabel("frequency as sampled, Hz")
-    for row in grid:
-        for ax in row:
+    for r, row in enumerate(grid):
+        for k, ax in enumerate(row):
             ax.locator_params(axis="x", nbins=7, prune="upper")
+            canvas.label_ticks(ax, left=k == 0, bottom=r == len(grid) - 1)
             ax.yaxis.set_major_locator(LogLocator(numticks=4))
             ax.yaxis.set_major_formatter("{x:g}")
             ax.yaxis.set_minor_locator(NullLocator())

@@ -1,0 +1,90 @@
+"""From a trial folder to the frozen values that its report is made of."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import olivevib
+from olivevib.files.store import read_header
+from olivevib.report.content import ReportContent
+from olivevib.report.season import SeasonEntry
+from olivevib.trial.stages import STAGES
+from olivevib.trial.summary import summary
+
+if TYPE_CHECKING:
+    from olivevib.trial import Trial
+
+_RECORD = ("session", "tree", "machine", "outcome", "markers", "cameras", "accelerometers")
+
+
+def content_of(trial: Trial) -> ReportContent:
+    """Everything that the report of ``trial`` shows; None and () where a stage has not run."""
+    settings, tracks = trial.settings, trial.tracks
+    return ReportContent(
+        name=trial.name,
+        record=_record(trial),
+        summary=summary(trial),
+        places=places_of(trial),
+        simulated=settings.session.simulated,
+        rig=trial.rig,
+        calibration=trial.calibration,
+        tracks=(*tracks.left, *tracks.right) if tracks else (),
+        recordings={side: asdict(record) for side, record in tracks.cameras.items()}
+        if tracks
+        else {},
+        trajectory=trial.trajectory,
+        vibration=trial.vibration,
+        comparisons=trial.comparison,
+        cautions=trial.cautions,
+        provenance=provenance(trial),
+    )
+
+
+def entry_of(trial: Trial, link: str = "") -> SeasonEntry:
+    """What a season page needs of one trial."""
+    return SeasonEntry(
+        name=trial.name,
+        record=_record(trial),
+        summary=summary(trial),
+        places=places_of(trial),
+        simulated=trial.settings.session.simulated,
+        link=link,
+    )
+
+
+def places_of(trial: Trial) -> dict[int, str]:
+    """Where each described marker sits: its place, and the branch's diameter where it is known."""
+    out = {}
+    for marker in trial.settings.markers.marker:
+        words: list[str] = [marker.place or ""]
+        if marker.branch_diameter_mm is not None:
+            words.append(f"{marker.branch_diameter_mm:g} mm thick")
+        out[marker.id] = ", ".join(w for w in words if w)
+    return {i: place for i, place in out.items() if place}
+
+
+def _record(trial: Trial) -> dict[str, Any]:
+    """The session record as plain values (dates as text)."""
+    plain: dict[str, Any] = trial.settings.model_dump(mode="json", include=set(_RECORD))
+    return plain
+
+
+def provenance(trial: Trial) -> dict[str, str]:
+    """The command, versions, the settings' hash, and what each stage was computed from."""
+    text = json.dumps(trial.settings.model_dump(mode="json"), sort_keys=True)
+    out = {
+        "command": f"olivevib report {trial.name}",
+        "olivevib": olivevib.__version__,
+        "settings, SHA-256": hashlib.sha256(text.encode()).hexdigest(),
+    }
+    for stage in STAGES:
+        path = trial.folder / stage.file
+        if not path.exists():
+            continue
+        header = read_header(path)
+        out[f"{stage.file} written by olivevib"] = header.software_version
+        out |= {f"{stage.file} from {name}, SHA-256": sha for name, sha in header.inputs.items()}
+    return out

@@ -1,0 +1,127 @@
+"""Several trials on one page: one table, and box plots by what the session records say."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from olivevib.progress import Tick, silent
+from olivevib.report.clean import clean
+from olivevib.report.figures.boxes import boxes
+from olivevib.report.page import environment
+from olivevib.report.plates import Plate
+from olivevib.report.words import NOT_KNOWN, count, known, measure
+
+QUANTITIES = (
+    ("displacement_pp_mm", "displacement, peak to peak, mm"),
+    ("acceleration_rms_m_s2", "acceleration, rms of all axes, m/s²"),
+    ("frequency_hz", "frequency of the dominant line where it is known, Hz"),
+)
+SURE = ("direct", "confirmed")
+
+
+@dataclass(frozen=True)
+class SeasonEntry:
+    """What a season needs of one trial: its session record, its summary, places of markers.
+
+    link: address of the trial's own page relative to the season page; empty: none.
+    """
+
+    name: str
+    record: Mapping[str, Any] = field(default_factory=dict)
+    summary: Mapping[str, Any] = field(default_factory=dict)
+    places: Mapping[int, str] = field(default_factory=dict)
+    simulated: bool = False
+    link: str = ""
+
+    def typed(self, section: str, key: str) -> str:
+        """A value of the session record as text; "not known" where nobody typed it."""
+        value = (self.record.get(section) or {}).get(key)
+        return clean(value, 40) if value not in (None, "") else NOT_KNOWN
+
+    def markers(self) -> list[Mapping[str, Any]]:
+        """The summary of each marker."""
+        return list(self.summary.get("markers") or [])
+
+
+Factor = Callable[[SeasonEntry, int], str]
+FACTORS: tuple[tuple[str, Factor], ...] = (
+    ("marker place", lambda e, i: clean(e.places.get(i, ""), 40) or NOT_KNOWN),
+    ("cultivar", lambda e, _: e.typed("tree", "cultivar")),
+    ("machine", lambda e, _: e.typed("machine", "make")),
+    ("trial", lambda e, _: clean(e.name, 40)),
+)
+
+
+def render_season(entries: Sequence[SeasonEntry], tick: Tick = silent) -> str:
+    """All trials as one HTML document; the table first, then the box plots."""
+    template = environment().get_template("season.html.j2")
+    markers = sum(len(e.markers()) for e in entries)
+    return template.render(
+        name=f"{count(len(entries), 'trial')}, {count(markers, 'marker')}",
+        rows=[season_row(e) for e in entries],
+        plates=season_plates(entries, tick),
+        simulated=sum(e.simulated for e in entries),
+        total=len(entries),
+    )
+
+
+def season_row(entry: SeasonEntry) -> tuple[str, ...]:
+    """One trial in the table: record, the marker that moves most, calibration, verdict."""
+    best = max(entry.markers(), key=_moved, default=None)
+    calibration = entry.summary.get("calibration") or {}
+    comparison = entry.summary.get("comparison") or {}
+    line, moved, shaken = NOT_KNOWN, NOT_KNOWN, NOT_KNOWN
+    if best is not None:
+        status = clean(best.get("frequency_status") or NOT_KNOWN, 20)
+        hz = measure(best.get("frequency_hz"), "Hz", best.get("frequency_sigma_hz"))
+        line = f"{hz} ({status})" if status in SURE else status
+        moved = f"{measure(best.get('displacement_pp_mm'), 'mm', digits=3)} (marker {best['id']})"
+        shaken = measure(best.get("acceleration_rms_m_s2"), "m/s2", digits=3)
+    return (
+        clean(entry.name, 60) + (" (simulated)" if entry.simulated else ""),
+        clean(entry.link),
+        entry.typed("session", "date"),
+        entry.typed("session", "place"),
+        entry.typed("tree", "cultivar"),
+        entry.typed("machine", "make"),
+        line,
+        moved,
+        shaken,
+        measure(calibration.get("holdout_rms_percent"), "%", digits=2),
+        clean(comparison.get("verdict") or "not compared", 30),
+        str(len(entry.summary.get("warnings") or [])),
+    )
+
+
+def _moved(marker: Mapping[str, Any]) -> float:
+    value = marker.get("displacement_pp_mm")
+    return float(value) if value is not None and known(value) else -1.0
+
+
+def season_plates(entries: Sequence[SeasonEntry], tick: Tick = silent) -> list[Plate]:
+    """A box plot for each quantity and factor that splits the markers into two groups or more."""
+    jobs = [(q, f) for q in QUANTITIES for f in FACTORS]
+    out = []
+    for done, ((key, quantity), (factor, of)) in enumerate(jobs):
+        tick(done, len(jobs), f"drawing: {quantity} by {factor}")
+        groups = _groups(entries, key, of)
+        if len(groups) > 1:
+            svg = boxes(f"{key}-{factor.replace(' ', '')}", quantity, groups)
+            out.append(Plate(quantity, svg, f"By {factor}: one dot a marker and trial."))
+    tick(len(jobs), len(jobs), "figures drawn")
+    return out
+
+
+def _groups(entries: Sequence[SeasonEntry], key: str, of: Factor) -> dict[str, list[float]]:
+    """Known values of one quantity by group; groups in order of their name."""
+    found: dict[str, list[float]] = defaultdict(list)
+    for entry in entries:
+        for marker in entry.markers():
+            value = marker.get(key)
+            sure = key != "frequency_hz" or marker.get("frequency_status") in SURE
+            if sure and value is not None and known(value):
+                found[of(entry, int(marker["id"]))].append(float(value))
+    return dict(sorted(found.items()))
