@@ -147,7 +147,7 @@ def _derived(n: int, part: Samples, found: LineFit, facts: SamplingFacts) -> Flo
 def scaled_line(line: Line, derivative: int) -> LineFigures:
     """The line's figures in the n-th derivative; unknown where its true frequency is."""
     known = line.status in (LineStatus.DIRECT, LineStatus.CONFIRMED, LineStatus.SUPPORTED)
-    if line.status is LineStatus.NONE or (derivative and not known):
+    if line.status in (LineStatus.NONE, LineStatus.CHIRP) or (derivative and not known):
         return NO_LINE
     return line_motion(line, derivative)
 
@@ -253,6 +253,14 @@ def cautions(
                 "frequency-blind",
                 "A line lies where this frame rate cannot tell it from sway or from its mirror.",
                 "Change the machine's speed by 2 Hz or the cameras' frame rate.",
+            )
+        )
+    if LineStatus.CHIRP in statuses:
+        out.append(
+            Caution(
+                "frequency-chirp",
+                "The machine's speed changes too fast for one line to describe it.",
+                "Let the machine run at one speed for at least five seconds.",
             )
         )
     if shown.name == WHOLE:

@@ -9,6 +9,7 @@ from scipy.special import gammaincinv
 
 from olivevib.arrays import Bools, Floats
 from olivevib.signals import Samples
+from olivevib.vibration.chirp import Chirp, find_chirp
 from olivevib.vibration.clock import Clock, clock_of, measured
 from olivevib.vibration.lsscan import OVERSAMPLING, Scan, scan
 from olivevib.vibration.sinefit import SineFit, Tones, fit_sines
@@ -18,6 +19,7 @@ from olivevib.vibration.verdict import Finding, SamplingFacts, fold, judge
 
 _FEWEST = 12  # samples below which nothing is called a line
 _APART = 1.5  # bins of 1/T that two waves must lie apart to be told apart safely
+_MOST = 0.5  # of the motion that a line must explain not to be asked about its speed
 _LOCAL = 16  # bins either side whose median is the local noise
 
 
@@ -71,18 +73,31 @@ def fit_line(samples: Samples, facts: SamplingFacts, settings: LineSettings) -> 
         return _nothing(samples, t_s, f"Only {t_s.size} samples: too few to look for a line.")
     search = _Search.of(t_s, values, facts, settings)
     fit, sway = search.fitted()
+    if settings.sway and (fit is None or not search.explains(fit)):
+        chirp = find_chirp(samples, facts.sway_hz)
+        if chirp is not None:
+            return _nothing(samples, t_s, _too_fast(chirp), LineStatus.CHIRP)
     if fit is None:
         return _nothing(samples, t_s, "No line stands out of the noise.")
     return _judged(search, fit, sway, samples)
 
 
-def _nothing(samples: Samples, t_s: Floats, reason: str) -> LineFit:
+def _too_fast(chirp: Chirp) -> str:
+    return (
+        f"The speed changes too fast for one line: seen between {chirp.low_hz:.1f} and "
+        f"{chirp.high_hz:.1f} Hz. Let the machine run at one speed for five seconds."
+    )
+
+
+def _nothing(
+    samples: Samples, t_s: Floats, reason: str, status: LineStatus = LineStatus.NONE
+) -> LineFit:
     unknown = np.full(3, np.nan)
     middle = float(t_s.mean()) if t_s.size else 0.0
     line = Line(
         f_hz=np.nan,
         f_sigma_hz=np.nan,
-        status=LineStatus.NONE,
+        status=status,
         candidates_hz=(),
         amplitude=unknown,
         amplitude_sigma=unknown,
@@ -131,6 +146,11 @@ class _Search:
         if fit is None and not self.facts.direct:
             return self.one(None, 0.0), None
         return fit, sway
+
+    def explains(self, fit: SineFit) -> bool:
+        """The waves hold most of what they leave and they together hold."""
+        power = float(np.sum(fit.motion(self.t_s) ** 2))
+        return power > _MOST * (power + float(np.sum(fit.residual**2)))
 
     def one(self, sway: Floats | None, from_hz: float) -> SineFit | None:
         values = self.values if sway is None else self.values - sway @ (sway.T @ self.values)
