@@ -36,6 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"olivevib {__version__}")
+    _common(parser)
     parser.set_defaults(verb="home:app", quiet=False, debug=False)
     verbs = parser.add_subparsers(title="verbs", metavar="VERB")
     _prepare_verbs(verbs)
@@ -53,10 +54,20 @@ def _add(verbs: Any, name: str, function: str, help_: str, more: str = "") -> An
         epilog=more,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("-q", "--quiet", action="store_true", help="errors only on stderr")
-    parser.add_argument("--debug", action="store_true", help="show a traceback on errors")
+    _common(parser)
     parser.set_defaults(verb=function)
     return parser
+
+
+def _common(parser: Any) -> None:
+    """The options that every verb knows, before or after its name."""
+    absent = argparse.SUPPRESS
+    parser.add_argument(
+        "-q", "--quiet", action="store_true", default=absent, help="errors only on stderr"
+    )
+    parser.add_argument(
+        "--debug", action="store_true", default=absent, help="show a traceback on errors"
+    )
 
 
 def _prepare_verbs(verbs: Any) -> None:

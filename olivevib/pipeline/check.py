@@ -51,12 +51,11 @@ def _recordings(trial: Trial, tick: Tick) -> Iterator[Finding]:
 
 
 def _recording(path: Path, name: str, side: str, tick: Tick) -> Finding:
-    frames = damaged = 0
+    frames = 0
     try:
         with open_source(path, side) as source:
-            for frame in source.frames():
+            for _ in source.frames():
                 frames += 1
-                damaged += frame.grey is None
                 tick(frames, None, f"reading {name}")
             cautions = source.cautions
     except OlivevibError as error:

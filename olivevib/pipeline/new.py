@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import tomlkit
@@ -26,7 +26,10 @@ from olivevib.trial.document import FILE
 
 @dataclass(frozen=True)
 class NewTrial:
-    """What ``olivevib new`` was told; paths as the user gave them."""
+    """What ``olivevib new`` was told; paths as the user gave them.
+
+    places, sizes_mm: where single markers sit and their own size, where somebody knows it already.
+    """
 
     left: str
     right: str
@@ -46,6 +49,8 @@ class NewTrial:
     accelerometer_marker: int | None = None
     link: bool = False
     simulated: bool = False
+    places: Mapping[int, str] = field(default_factory=dict)
+    sizes_mm: Mapping[int, float] = field(default_factory=dict)
 
 
 def new_trial(folder: Path, plan: NewTrial, tick: Tick = silent) -> Trial:
@@ -229,10 +234,19 @@ def _document(plan: NewTrial, places: _Places) -> tomlkit.TOMLDocument:
 def _markers(plan: NewTrial, places: _Places) -> Table:
     library = places.get(plan.markers) if plan.markers.endswith(".toml") else plan.markers
     table = _table({"library": library, "size_mm": plan.size_mm, "ids": list(plan.ids) or None})
-    table.add(tomlkit.comment("where each one sits, for the report:"))
-    table.add(tomlkit.comment("[[markers.marker]]"))
-    table.add(tomlkit.comment("id = 1"))
-    table.add(tomlkit.comment("place = 'trunk'   # trunk, branch, twig or fixed"))
+    table.add(
+        tomlkit.comment("where each one sits, for the report (trunk, branch, twig or fixed):")
+    )
+    each = sorted({*plan.places, *plan.sizes_mm})
+    if not each:
+        for line in ("[[markers.marker]]", "id = 1", "place = 'trunk'"):
+            table.add(tomlkit.comment(line))
+        return table
+    table["marker"] = tomlkit.aot()
+    for marker in each:
+        size = plan.sizes_mm.get(marker)
+        row = {"id": marker, "place": plan.places.get(marker), "size_mm": size}
+        table["marker"].append(_table(row))
     return table
 
 
