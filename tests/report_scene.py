@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -180,7 +181,16 @@ def vibration(path: Trajectory, spectra: Spectrum) -> Vibration:
             MarkerMotion(int(marker_id), "steady", 1.8, end - 1.6, samples.t_s.size, each, moved,
                          unknown("velocity", "mm/s"), nothing, candidates)
         )  # fmt: skip
-    return Vibration(phases, {"displacement": spectra}, tuple(table), "steady")
+    known = all(line.status is not LineStatus.AMBIGUOUS for line in spectra.lines)
+    factor = (2 * np.pi * spectra.f_hz[:, None, None]) ** 2 / 1000 if known else np.nan
+    rates = {
+        quantity: replace(spectra, quantity=quantity, unit=unit, amplitude=a, psd=a**2)
+        for quantity, unit, a in (
+            ("velocity", "mm/s", np.full_like(spectra.amplitude, np.nan)),
+            ("acceleration", "m/s2", spectra.amplitude * factor),
+        )
+    }
+    return Vibration(phases, {"displacement": spectra} | rates, tuple(table), "steady")
 
 
 def comparison() -> Comparison:

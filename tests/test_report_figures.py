@@ -37,9 +37,9 @@ def every(path) -> dict[str, str]:
     return {
         "motion": figures.time_series(path, NAMES, IDS, figures.whole(path)),
         "close": figures.time_series(path, NAMES, IDS, figures.Window(1.0, 2.0, close=True)),
-        "amplitude": figures.spectrum_rows(spectrum, NAMES, IDS, "amplitude"),
-        "psd": figures.spectrum_rows(spectrum, NAMES, IDS, "psd"),
-        "frequency": figures.frequencies(spectrum, NAMES),
+        "amplitude": figures.amplitude_spectra(spectrum, NAMES, IDS, 15.0),
+        "psd": figures.power_spectra(spectrum, NAMES, IDS, 15.0),
+        "frequency": figures.frequencies(spectrum, NAMES, 15.0),
         "orbits": figures.orbits(path, NAMES, IDS, 5.0),
         "scene": figures.scene(scene.rig(), path, NAMES),
         "distances": figures.distances(path, figures.pair_distances(path), NAMES),

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import olivevib
+from olivevib.errors import Caution
 from olivevib.files.store import read_header
 from olivevib.report.content import ReportContent
 from olivevib.report.season import SeasonEntry
@@ -26,7 +29,7 @@ def content_of(trial: Trial) -> ReportContent:
     return ReportContent(
         name=trial.name,
         record=_record(trial),
-        summary=summary(trial),
+        summary=within(trial.folder, summary(trial)),
         places=places_of(trial),
         simulated=settings.session.simulated,
         rig=trial.rig,
@@ -38,7 +41,10 @@ def content_of(trial: Trial) -> ReportContent:
         trajectory=trial.trajectory,
         vibration=trial.vibration,
         comparisons=trial.comparison,
-        cautions=trial.cautions,
+        cautions=tuple(
+            Caution(c.code, within(trial.folder, c.text), within(trial.folder, c.remedy))
+            for c in trial.cautions
+        ),
         provenance=provenance(trial),
     )
 
@@ -48,7 +54,7 @@ def entry_of(trial: Trial, link: str = "") -> SeasonEntry:
     return SeasonEntry(
         name=trial.name,
         record=_record(trial),
-        summary=summary(trial),
+        summary=within(trial.folder, summary(trial)),
         places=places_of(trial),
         simulated=trial.settings.session.simulated,
         link=link,
@@ -64,6 +70,20 @@ def places_of(trial: Trial) -> dict[int, str]:
             words.append(f"{marker.branch_diameter_mm:g} mm thick")
         out[marker.id] = ", ".join(w for w in words if w)
     return {i: place for i, place in out.items() if place}
+
+
+def within(folder: Path, value: Any) -> Any:
+    """Plain values whose texts name files of the trial relative to it: a page travels."""
+    if isinstance(value, str):
+        for place in (folder, folder.resolve()):
+            if place.name:
+                value = value.replace(f"{place}{os.sep}", "")
+        return value
+    if isinstance(value, dict):
+        return {k: within(folder, v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [within(folder, v) for v in value]
+    return value
 
 
 def _record(trial: Trial) -> dict[str, Any]:

@@ -13,7 +13,8 @@ from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
 from olivevib.report.verdict import strongest
 from olivevib.report.words import number
-from olivevib.vibration.types import Line
+from olivevib.signals import fit_stamps
+from olivevib.vibration import Spectrum
 
 ROWS = 8  # markers in one figure
 CLOSE_S = 1.0  # length of the close-up
@@ -111,27 +112,44 @@ def _close(content: ReportContent, ids: Sequence[int]) -> tuple[figures.Window, 
     return window, sorted(ranked[:3])
 
 
+def half_rate_hz(content: ReportContent) -> float:
+    """Half the frame rate of the trial, where frequencies fold, Hz."""
+    path, spectrum = content.trajectory, content.displacement
+    if path is not None and path.t_s.size > 1:
+        return fit_stamps(path.t_s).rate_hz / 2
+    return float(spectrum.f_hz[-1]) if spectrum is not None else float("nan")
+
+
 def _spectra(content: ReportContent) -> Iterator[_Job]:
-    spectrum, names = content.displacement, content.names()
+    spectrum, names, half = content.displacement, content.names(), half_rate_hz(content)
     if spectrum is None or not spectrum.ids.size:
         return
-    of = _window_words(content)
-    yield ("frequency", _FREQUENCY, lambda: figures.frequencies(spectrum, names))
+    yield ("frequency", _FREQUENCY, lambda: figures.frequencies(spectrum, names, half))
+    acceleration = content.vibration.spectra.get("acceleration") if content.vibration else None
+    for each in [s for s in (spectrum, acceleration) if s is not None]:
+        for group in _groups(_finite_ids(each), ROWS):
+            words = _AMPLITUDE.format(of=each.quantity) + _window_words(each, half)
+            yield ("spectra", words, _bound(figures.amplitude_spectra, each, names, group, half))
+    for group in _groups(_finite_ids(spectrum), 12):
+        job = _bound(figures.power_spectra, spectrum, names, group, half)
+        yield ("psd", _PSD + _window_words(spectrum, half), job)
+
+
+def _finite_ids(spectrum: Spectrum | None) -> list[int]:
+    """The markers of which a spectrum knows anything, by id."""
+    if spectrum is None:
+        return []
     finite = np.isfinite(spectrum.amplitude)
-    ids = sorted(int(i) for m, i in enumerate(spectrum.ids) if finite[:, m].any())
-    for kind, words in (("amplitude", _AMPLITUDE), ("psd", _PSD)):
-        for group in _groups(ids, ROWS):
-            job = _bound(figures.spectrum_rows, spectrum, names, group, kind)
-            yield ("spectra" if kind == "amplitude" else "psd", words + of, job)
+    return sorted(int(i) for m, i in enumerate(spectrum.ids) if finite[:, m].any())
 
 
-def _window_words(content: ReportContent) -> str:
-    s = content.displacement
-    assert s is not None
+def _window_words(s: Spectrum, half_hz: float) -> str:
+    """How a spectrum was made: phase, window, bins, and where its axis ends."""
+    span = f", {s.start_s:.2f} to {s.end_s:.2f} s" if np.isfinite(s.start_s + s.end_s) else ""
     return (
-        f" Displacement; {s.window} window, {number(s.resolution_hz, 3)} Hz between bins, noise"
-        f" bandwidth {number(s.enbw_bins, 3)} bins; axis up to half the frame rate,"
-        f" {number(float(s.f_hz[-1]), 4)} Hz."
+        f" Phase: {clean(s.phase, 20)}{span}; {clean(s.window, 20)} window,"
+        f" {number(s.resolution_hz, 3)} Hz between bins, noise bandwidth"
+        f" {number(s.enbw_bins, 3)} bins; axis up to half the frame rate, {number(half_hz, 4)} Hz."
     )
 
 
@@ -159,11 +177,6 @@ def _quality(content: ReportContent) -> Iterator[_Job]:
         if np.isfinite(comparison.optical_mm).any():
             caption = f"{clean(comparison.sensor, 60)}: {_SENSOR}"
             yield ("comparison", caption, _bound(figures.overlay, comparison, number_of))
-
-
-def sizes_mm(line: Line) -> float:
-    """The resultant amplitude of a line, mm."""
-    return float(np.linalg.norm(line.amplitude))
 
 
 _SCENE = (
@@ -194,10 +207,13 @@ _FREQUENCY = (
     " half the frame rate."
 )
 _AMPLITUDE = (
-    "Amplitude spectrum (peak). Dashed: the dominant line as this frame rate shows it, the"
-    " triangle its fitted amplitude. Dotted: noise floor."
+    "Amplitude spectrum (peak) of the {of}. Dashed: the dominant line as this frame rate shows it,"
+    " the triangle its fitted amplitude. Dotted: noise floor."
 )
-_PSD = "Power spectral density. Dashed: the dominant line; dotted: noise floor."
+_PSD = (
+    "Power spectral density of the displacement, the powers of the three axes added. Dashed: the"
+    " dominant line; dotted: noise floor."
+)
 _SEEN = "State of every sample: full height means located; the thinner, the less is known."
 _SIGMA = (
     "How well one position is known: median (symbol) and the middle 90 % of the frames (bar)."

@@ -11,13 +11,14 @@ from olivevib.report.figures.residuals import holdout, residual_map
 from olivevib.report.figures.scene import scene
 from olivevib.report.figures.sensor import overlay
 from olivevib.report.figures.sigma import sigmas
-from olivevib.report.figures.spectra import describe, spectrum_rows
+from olivevib.report.figures.spectra import amplitude_spectra, describe, power_spectra
 from olivevib.report.figures.visibility import strips, visibility
 
 __all__ = [
     "MOST_ACROSS",
     "Distance",
     "Window",
+    "amplitude_spectra",
     "boxes",
     "describe",
     "distances",
@@ -27,10 +28,10 @@ __all__ = [
     "orbits",
     "overlay",
     "pair_distances",
+    "power_spectra",
     "residual_map",
     "scene",
     "sigmas",
-    "spectrum_rows",
     "strips",
     "time_series",
     "visibility",

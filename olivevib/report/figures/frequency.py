@@ -15,13 +15,13 @@ from olivevib.vibration.types import Line, LineStatus, Spectrum
 OPEN_STATUSES = (LineStatus.AMBIGUOUS, LineStatus.ALIASED)
 
 
-def frequencies(spectrum: Spectrum, names: Mapping[int, str]) -> str:
+def frequencies(spectrum: Spectrum, names: Mapping[int, str], nyquist_hz: float) -> str:
     """One row a marker on one frequency axis: filled = known, open = candidate, bar = sigma.
 
     Uprights stand at multiples of half the sampling rate, where the true frequency folds.
     """
     height = 0.75 + 0.24 * len(spectrum.lines)
-    nyquist = float(spectrum.f_hz[-1])
+    nyquist = nyquist_hz
     highest = max((f for line in spectrum.lines for f in _all(line)), default=nyquist)
     top = max(nyquist, highest) * 1.05
 

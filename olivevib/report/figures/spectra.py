@@ -1,4 +1,4 @@
-"""Amplitude spectrum and power spectral density of each marker and axis, with the marked line."""
+"""Amplitude spectra: a row a marker, a column an axis, with the marked line; PSD of all axes."""
 
 from __future__ import annotations
 
@@ -45,74 +45,105 @@ def describe(line: Line) -> str:
     return f"{measure(line.f_hz, 'Hz', line.f_sigma_hz)} ({line.status})"
 
 
-def spectrum_rows(
-    spectrum: Spectrum, names: Mapping[int, str], ids: Sequence[int], kind: str
+def amplitude_spectra(
+    spectrum: Spectrum, names: Mapping[int, str], ids: Sequence[int], nyquist_hz: float
 ) -> str:
-    """Spectra of some markers: a row a marker, a column an axis, logarithmic values.
+    """Peak amplitude over frequency, logarithmic: a row a marker, a column an axis.
 
-    kind "amplitude" (peak amplitude) or "psd". The dashed upright is the dominant line as the
-    camera sees it; the dotted level is the noise floor; the axis ends at half the sampling rate.
+    The dashed upright is the dominant line as the camera sees it, the triangle its fitted
+    amplitude, the dotted level the noise floor; the axis ends at half the sampling rate.
     """
-    height = 0.62 + 0.98 * len(ids)
-    title = f"{'Amplitude spectrum' if kind == 'amplitude' else 'Power spectral density'}"
+    height = 0.66 + 0.98 * len(ids)
+    lines = dict(zip(spectrum.ids.tolist(), spectrum.lines, strict=True))
 
     def paint(figure: Figure) -> None:
         grid = canvas.rows_and_columns(
             figure, len(ids), 3, margins_in=(0.6, 0.15, 0.4, 0.4), gaps_in=(0.2, 0.26)
         )
-        top, bottom = _limits(spectrum, ids, kind)
-        for row, marker_id in zip(grid, ids, strict=True):
+        limits = _limits(spectrum.amplitude[1:, np.isin(spectrum.ids, ids)])
+        for r, (row, marker_id) in enumerate(zip(grid, ids, strict=True)):
             m = int(np.flatnonzero(spectrum.ids == marker_id)[0])
+            line = lines[marker_id]
             for k, ax in enumerate(row):
-                _panel(ax, spectrum, (m, k), kind)
-                ax.set_ylim(bottom, top)
-        lines = dict(zip(spectrum.ids.tolist(), spectrum.lines, strict=True))
+                values = spectrum.amplitude[:, m, k]
+                where = _curve(ax, spectrum, values, (line, nyquist_hz), canvas.AXIS_COLOURS[k])
+                if np.isfinite(where) and line.amplitude[k] > 0:
+                    ax.plot(where, line.amplitude[k], "v", color=canvas.MARK, ms=4, mew=0)
+                _scales(ax, limits, left=k == 0, bottom=r == len(ids) - 1)
         canvas.row_names(figure, grid, [f"{names[i]} — {describe(lines[i])}" for i in ids])
-        unit = unit_text(spectrum.unit)
-        of = f"{unit} peak" if kind == "amplitude" else f"{unit}²/Hz"
-        canvas.column_heads(figure, grid, [f"{axis}, {of}" for axis in "xyz"])
-        _frame(grid)
+        unit = f"{unit_text(spectrum.unit)} peak"
+        canvas.column_heads(figure, grid, [f"{axis}, {unit}" for axis in "xyz"])
 
-    return canvas.draw(f"{kind}{ids[0]}", f"{title} of {len(ids)} markers", height, paint)
+    name = f"{spectrum.quantity}{ids[0]}"
+    title = f"Amplitude spectrum of the {spectrum.quantity} of {len(ids)} markers"
+    return canvas.draw(name, title, height, paint)
 
 
-def _limits(spectrum: Spectrum, ids: Sequence[int], kind: str) -> tuple[float, float]:
-    values = spectrum.amplitude if kind == "amplitude" else spectrum.psd
-    chosen = values[1:, np.isin(spectrum.ids, ids)]
-    positive = chosen[np.isfinite(chosen) & (chosen > 0)]
+def power_spectra(
+    spectrum: Spectrum, names: Mapping[int, str], ids: Sequence[int], nyquist_hz: float
+) -> str:
+    """Power spectral density of the three axes together (powers add), a panel a marker."""
+    columns = 3
+    rows = -(-len(ids) // columns)
+    height = 0.66 + 1.1 * rows
+    total = spectrum.psd.sum(axis=2)
+    lines = dict(zip(spectrum.ids.tolist(), spectrum.lines, strict=True))
+
+    def paint(figure: Figure) -> None:
+        grid = canvas.rows_and_columns(
+            figure, rows, columns, margins_in=(0.6, 0.15, 0.36, 0.4), gaps_in=(0.2, 0.28)
+        )
+        limits = _limits(total[1:, np.isin(spectrum.ids, ids)])
+        panels = [ax for row in grid for ax in row]
+        for place, (ax, marker_id) in enumerate(zip(panels, ids, strict=False)):
+            m = int(np.flatnonzero(spectrum.ids == marker_id)[0])
+            _curve(ax, spectrum, total[:, m], (lines[marker_id], nyquist_hz), canvas.LEFT)
+            lowest = place + columns >= len(ids)
+            _scales(ax, limits, left=place % columns == 0, bottom=lowest)
+            ax.set_title(names[marker_id], loc="left", pad=3, fontsize=7.5, fontweight="bold")
+        for ax in panels[len(ids) :]:
+            ax.remove()
+        unit = f"{unit_text(spectrum.unit)}²/Hz, x + y + z"
+        canvas.note(figure, 0.02, 0.1, unit, va="center", fontsize=8)
+
+    title = f"Power spectral density of {len(ids)} markers"
+    return canvas.draw(f"psd{ids[0]}", title, height, paint)
+
+
+def _limits(values: Floats) -> tuple[float, float]:
+    """Lowest and highest value worth drawing of spectra (F, …)."""
+    positive = values[np.isfinite(values) & (values > 0)]
     if not positive.size:
-        return 1.0, 1e-3
+        return 1e-3, 1.0
     top = float(positive.max()) * 2
-    return top, max(float(np.percentile(positive, 2)) / 2, top * 1e-9)
+    return max(float(np.percentile(positive, 2)) / 2, top * 1e-9), top
 
 
-def _panel(ax: Axes, spectrum: Spectrum, at: tuple[int, int], kind: str) -> None:
-    m, k = at
-    line = spectrum.lines[m]
-    values = (spectrum.amplitude if kind == "amplitude" else spectrum.psd)[:, m, k]
-    nyquist = float(spectrum.f_hz[-1])
+def _curve(
+    ax: Axes, spectrum: Spectrum, values: Floats, at: tuple[Line, float], colour: str
+) -> float:
+    """One spectrum (F,) with its noise floor and the upright of its line; returns where that is."""
+    line, nyquist_hz = at
     shown = np.where(values > 0, values, np.nan)
-    ax.semilogy(spectrum.f_hz[1:], shown[1:], color=canvas.AXIS_COLOURS[k], lw=0.8)
-    where = seen_at_hz(line, nyquist)
+    ax.semilogy(spectrum.f_hz[1:], shown[1:], color=colour, lw=0.8)
+    where = seen_at_hz(line, nyquist_hz)
     floor = noise_floor(spectrum.f_hz, values, where, spectrum.resolution_hz)
     if floor > 0:
         ax.axhline(floor, color=canvas.QUIET, lw=0.7, ls=(0, (1, 2)))
     if np.isfinite(where):
         ax.axvline(where, color=canvas.MARK, lw=0.7, ls=(0, (4, 2)), zorder=1)
-        if kind == "amplitude" and line.amplitude[k] > 0:
-            ax.plot(where, line.amplitude[k], "v", color=canvas.MARK, ms=4, mew=0)
-    ax.axvline(nyquist, color=canvas.QUIET, lw=0.8)
-    ax.set_xlim(0, nyquist)
+    ax.axvline(nyquist_hz, color=canvas.QUIET, lw=0.8)
+    ax.set_xlim(0, nyquist_hz)
+    return where
+
+
+def _scales(ax: Axes, limits: tuple[float, float], *, left: bool, bottom: bool) -> None:
+    ax.set_ylim(limits)
     ax.grid(axis="y")
-
-
-def _frame(grid: Sequence[Sequence[Axes]]) -> None:
-    for ax in grid[-1]:
+    ax.locator_params(axis="x", nbins=7, prune="upper")
+    canvas.label_ticks(ax, left=left, bottom=bottom)
+    ax.yaxis.set_major_locator(LogLocator(numticks=4))
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_locator(NullLocator())
+    if bottom:
         ax.set_xlabel("frequency as sampled, Hz")
-    for r, row in enumerate(grid):
-        for k, ax in enumerate(row):
-            ax.locator_params(axis="x", nbins=7, prune="upper")
-            canvas.label_ticks(ax, left=k == 0, bottom=r == len(grid) - 1)
-            ax.yaxis.set_major_locator(LogLocator(numticks=4))
-            ax.yaxis.set_major_formatter("{x:g}")
-            ax.yaxis.set_minor_locator(NullLocator())

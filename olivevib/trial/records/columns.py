@@ -29,7 +29,7 @@ def padded(rows: Sequence[Any], *rest: int) -> np.ndarray[Any, np.dtype[np.float
 
 def unpadded(row: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """The part of a padded row before the NaN."""
-    good = np.isfinite(row.reshape(len(row), -1)).any(axis=1)
+    good = np.isfinite(row).any(axis=tuple(range(1, row.ndim)))
     return row[: int(good.sum())]
 
 
