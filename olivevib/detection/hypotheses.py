@@ -1,0 +1,159 @@
+"""Location bars to hypotheses of a marker: two of the four bars are enough.
+
+Two opposite bars, or two adjacent ones, fix an affine frame: centre and the images a, b of one
+module to the right and down. Bars found where a hypothesis expects them support it. A false
+hypothesis costs a reading of its code; none is refused for want of a third bar.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from olivevib.arrays import Bools, Floats, Ints
+from olivevib.detection.domains import Bars
+from olivevib.marker import MarkerLayout
+
+SHORTEST_PX = 4.0  # of a bar that founds a hypothesis
+SLENDER = 1.8  # its length over its thickness
+LENGTHS = 1.3  # ratio of two opposite bars, at most
+PLACE = (0.11, 0.6)  # a bar's centroid is within .11 lengths + .6 px of its place
+SINE = 0.25  # between adjacent bars, at least
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Affine frames (F,): centre (F, 2) px, a and b (F, 2) px a module, bars that support each.
+
+    (a, b) turns clockwise on the screen as (right, down) does.
+    """
+
+    centre: Floats
+    a: Floats
+    b: Floats
+    support: Ints
+
+    def __len__(self) -> int:
+        return self.support.size
+
+    def only(self, keep: Bools | Ints) -> Frames:
+        """The frames ``keep`` alone, in that order."""
+        return Frames(self.centre[keep], self.a[keep], self.b[keep], self.support[keep])
+
+    def homographies(self) -> Floats:
+        """The frames as (F, 3, 3), centred modules to px."""
+        H = np.zeros((len(self), 3, 3))
+        H[:, :2, 0], H[:, :2, 1], H[:, :2, 2] = self.a, self.b, self.centre
+        H[:, 2, 2] = 1
+        return H
+
+
+def joined(parts: list[Frames]) -> Frames:
+    """Several sets of frames as one."""
+    return Frames(
+        np.concatenate([p.centre for p in parts]),
+        np.concatenate([p.a for p in parts]),
+        np.concatenate([p.b for p in parts]),
+        np.concatenate([p.support for p in parts]),
+    )
+
+
+def frame_hypotheses(bars: Bars, layout: MarkerLayout) -> Frames:
+    """Every frame that two opposite or two adjacent bars found, best supported first."""
+    founders = (bars.length >= SHORTEST_PX) & (bars.length >= SLENDER * bars.width)
+    few = bars.only(founders)
+    if len(few) < 2:
+        none = np.empty((0, 2))
+        return Frames(none, none, none, np.empty(0, np.int64))
+    i, j = _neighbours(few)
+    frames = joined([_opposite(few, i, j, layout), _adjacent(few, i, j, layout)])
+    frames = _clockwise(frames)
+    support = _support(frames, bars, layout)
+    frames = Frames(frames.centre, frames.a, frames.b, support)
+    return frames.only(np.argsort(-support, kind="stable"))
+
+
+def _neighbours(bars: Bars) -> tuple[Ints, Ints]:
+    """Pairs i < j closer than 1.8 lengths of the longer one."""
+    tree = cKDTree(bars.centre)
+    near = tree.query_ball_point(bars.centre, 1.8 * bars.length, return_sorted=False)
+    i = np.repeat(np.arange(len(bars)), [len(n) for n in near])
+    j = np.concatenate([np.asarray(n, dtype=np.int64) for n in near])
+    keep = i != j
+    low, high = np.minimum(i, j)[keep], np.maximum(i, j)[keep]
+    key = np.unique(low * len(bars) + high)
+    return key // len(bars), key % len(bars)
+
+
+def _opposite(bars: Bars, i: Ints, j: Ints, layout: MarkerLayout) -> Frames:
+    """Parallel bars of like length, side by side."""
+    Li, Lj = bars.length[i], bars.length[j]
+    axis_i, axis_j = bars.axis[i], bars.axis[j]
+    sine, cosine = np.abs(_cross(axis_i, axis_j)), np.abs((axis_i * axis_j).sum(axis=1))
+    L = (Li + Lj) / 2
+    keep = (np.maximum(Li, Lj) < LENGTHS * np.minimum(Li, Lj)) & (sine < (0.14 + 1.2 / L) * cosine)
+    i, j, L, axis_i, axis_j = i[keep], j[keep], L[keep], axis_i[keep], axis_j[keep]
+    same = np.sign((axis_i * axis_j).sum(axis=1))[:, None]
+    u = (bars.length[i, None] * axis_i + same * bars.length[j, None] * axis_j) / 2
+    d = bars.centre[j] - bars.centre[i]
+    along = u / np.linalg.norm(u, axis=1, keepdims=True)
+    apart = np.abs(_cross(along, d))
+    shift = np.abs((along * d).sum(axis=1))
+    thick = (bars.width[i] + bars.width[j]) / 2
+    keep = (apart > np.maximum(2.5, 3 * thick)) & (apart < np.minimum(22 * thick, 1.75 * L))
+    keep &= (shift < 1.5 * L) & (np.hypot(apart, shift) < 1.8 * L)
+    i, j, u, d = i[keep], j[keep], u[keep], d[keep]
+    centre = (bars.centre[i] + bars.centre[j]) / 2
+    return Frames(centre, u / layout.bar, d / (layout.modules - 1), np.full(i.size, 2))
+
+
+def _adjacent(bars: Bars, i: Ints, j: Ints, layout: MarkerLayout) -> Frames:
+    """Bars whose axes meet where a cornerstone of both should be."""
+    half = (layout.modules - 1) / 2
+    sine = _cross(bars.axis[i], bars.axis[j])
+    keep = np.abs(sine) >= SINE
+    i, j, sine = i[keep], j[keep], sine[keep]
+    between = bars.centre[j] - bars.centre[i]
+    ahead = _cross(between, bars.axis[j]) / sine
+    back = _cross(between, bars.axis[i]) / sine
+    Li, Lj = bars.length[i], bars.length[j]
+    keep = np.abs(np.abs(ahead) - half / layout.bar * Li) < PLACE[0] * Li + PLACE[1]
+    keep &= np.abs(np.abs(back) - half / layout.bar * Lj) < PLACE[0] * Lj + PLACE[1]
+    i, j = i[keep], j[keep]
+    corner = bars.centre[i] + ahead[keep, None] * bars.axis[i]
+    a, b = (bars.centre[i] - corner) / half, (bars.centre[j] - corner) / half
+    return Frames(bars.centre[i] + bars.centre[j] - corner, a, b, np.full(i.size, 2))
+
+
+def _clockwise(frames: Frames) -> Frames:
+    turn = np.where(_cross(frames.a, frames.b) < 0, -1.0, 1.0)[:, None]
+    return Frames(frames.centre, frames.a, turn * frames.b, frames.support)
+
+
+def _support(frames: Frames, bars: Bars, layout: MarkerLayout) -> Ints:
+    """At how many of the four places of bars (F,) there is a domain that may be one."""
+    if len(frames) == 0:
+        return frames.support
+    half = (layout.modules - 1) / 2
+    tree = cKDTree(bars.centre)
+    total = np.zeros(len(frames), np.int64)
+    for way, along in ((frames.a, frames.b), (frames.b, frames.a)):
+        for sign in (-1, 1):
+            place = frames.centre + sign * half * way
+            far, at = tree.query(place)
+            wanted = layout.bar * along
+            length = np.linalg.norm(wanted, axis=1)
+            reach = PLACE[0] * layout.bar * np.linalg.norm(way, axis=1) + PLACE[1]
+            found = far < np.maximum(reach, PLACE[0] * length + PLACE[1])
+            slender = bars.length[at] > 2.2 * bars.width[at]
+            turned = np.abs(_cross(bars.axis[at], wanted)) >= 0.35 * length
+            wrong = np.abs(bars.length[at] - length) > 0.43 * length
+            total += found & ~(slender & (turned | wrong))
+    return total
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    out: Floats = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return out

@@ -1,0 +1,93 @@
+"""Reading a code from grey levels: each module speaks as loudly as it is clear.
+
+The levels of dark and white are taken from the marker itself in three ways; the library's code with
+the best agreement wins. Source: knowledge, soft decoding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from olivevib.arrays import Bools, Floats, Grey, Ints
+from olivevib.detection.codes import read_modules, sample_points
+from olivevib.marker import MarkerLibrary
+
+MASK = 0.22  # modules between the 3 x 3 reads of a module
+LOUDEST = 1.3  # agreement of one module, at most
+
+
+@dataclass(frozen=True)
+class SoftMatch:
+    """The best code of each of N readings: row in the library, turn (np.rot90 back to the print),
+    Hamming distance, and score: mean agreement of the modules, 1 for a perfect one.
+    """
+
+    row: Ints
+    turn: Ints
+    wrong: Ints
+    score: Floats
+
+
+class SoftReader:
+    """Reads codes of one library through homographies."""
+
+    def __init__(self, library: MarkerLibrary) -> None:
+        layout = library.layout
+        n, c = layout.modules, layout.code
+        self.side = c
+        views = np.stack([np.rot90(library.codes, -k, axes=(1, 2)) for k in range(4)], axis=1)
+        self._signs = np.where(views, -1, 1).reshape(-1, c * c).astype(np.float32)  # white +1
+        self._points = sample_points(layout, MASK)
+        frame = layout.pattern(np.zeros((c, c), np.bool_))
+        area = np.zeros((n, n), np.bool_)
+        area[(n - c) // 2 : (n + c) // 2, (n - c) // 2 : (n + c) // 2] = True
+        self._bars = np.flatnonzero(frame)
+        self._white = np.flatnonzero(~frame & ~area)
+        self._area = np.flatnonzero(area)
+        at = np.arange(n) - (n - 1) / 2
+        v, u = np.meshgrid(at, at, indexing="ij")
+        self._plane = np.column_stack([np.ones(n * n), u.ravel(), v.ravel()])
+
+    def match(self, grey: Grey, H: Floats) -> SoftMatch:
+        """The nearest code through each of H (N, 3, 3); white must be lighter than dark."""
+        levels = read_modules(grey, H, self._points)
+        best: SoftMatch | None = None
+        for dark, white in self._references(levels):
+            half = np.maximum((white - dark) / 2, 1.0)
+            clear = (levels[:, self._area] - (white + dark) / 2) / half
+            one = self._nearest(np.clip(clear, -LOUDEST, LOUDEST).astype(np.float32))
+            best = one if best is None else _better(best, one)
+        assert best is not None
+        return best
+
+    def _references(self, levels: Floats) -> list[tuple[Floats, Floats]]:
+        """Dark and white level of each area module (N, c²) or (N, 1), in three ways."""
+        bars, white = levels[:, self._bars], levels[:, self._white]
+        medians = tuple(np.median(x, axis=1, keepdims=True) for x in (bars, white))
+        planes = tuple(
+            (np.linalg.pinv(self._plane[at]) @ x.T).T @ self._plane[self._area].T
+            for at, x in ((self._bars, bars), (self._white, white))
+        )
+        area = levels[:, self._area]
+        extremes = (area.min(axis=1, keepdims=True), area.max(axis=1, keepdims=True))
+        return [(medians[0], medians[1]), (planes[0], planes[1]), extremes]
+
+    def _nearest(self, clear: NDArray[np.float32]) -> SoftMatch:
+        score = clear @ self._signs.T
+        best = score.argmax(axis=1)
+        top = np.take_along_axis(score, best[:, None], axis=1)[:, 0]
+        wrong = ((clear > 0) != (self._signs[best] > 0)).sum(axis=1)
+        return SoftMatch(best // 4, best % 4, wrong, top.astype(np.float64) / self.side**2)
+
+
+def _better(a: SoftMatch, b: SoftMatch) -> SoftMatch:
+    take: Bools = (b.wrong < a.wrong) | ((b.wrong == a.wrong) & (b.score > a.score))
+    return SoftMatch(
+        np.where(take, b.row, a.row),
+        np.where(take, b.turn, a.turn),
+        np.where(take, b.wrong, a.wrong),
+        np.where(take, b.score, a.score),
+    )

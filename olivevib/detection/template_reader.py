@@ -1,0 +1,206 @@
+"""The fine detector: bars, hypotheses, soft code, and the whole marker fitted to the image.
+
+Every marker is fitted by a drawing of itself, so that its centre is as good as the noise of the
+image allows; what is covered, shadowed or doubtful is flagged rather than quietly wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from olivevib.arrays import Bools, Floats, Grey, Ints
+from olivevib.detection.candidates import fine_bars, shadowed_dark, sharpened_dark
+from olivevib.detection.detection import Detection
+from olivevib.detection.hypotheses import Frames, frame_hypotheses, joined
+from olivevib.detection.refine import Fit, Singles, fit_template, marker_pixels, point_jacobian
+from olivevib.detection.settings import DetectionSettings
+from olivevib.detection.softcode import SoftMatch, SoftReader
+from olivevib.detection.template import PIXEL_VARIANCE, card, draw_template
+from olivevib.geometry import apply_homography
+from olivevib.marker import MarkerLibrary
+
+FIRST_VARIANCE_PX2 = 0.7**2 + PIXEL_VARIANCE  # blur at which a marker is drawn first
+VARIANCES_PX2 = (0.15, 6.0)  # blur that is believed
+REDRAWN_PX2 = 0.12  # change of the blur that asks for a new drawing
+COARSE_PX = 26.0  # centre to corner; above it the first fit uses every second pixel
+TRIED_WRONG = 8  # modules of 49 that a hypothesis may have wrong before it is fitted
+WRONG = (4, 6)  # after the fit: clear, and where a part is covered
+NCC = (0.75, 0.6)
+RMS = (0.16, 0.2)  # of the gain
+COVERED = 0.9  # mean weight below which a part is covered
+CELL = 0.7  # weight of a ninth of the marker below which it is called occluded
+SMALLEST_PX2 = 60.0
+NEAR_PX = 4.0
+
+
+@dataclass(frozen=True)
+class _Found:
+    """One fitted marker: its row in the library, pose as printed, fit and wrong modules."""
+
+    row: int
+    H: Floats
+    fit: Fit
+    turn: int
+    wrong: int
+
+
+class TemplateReader:
+    """Reads the markers of one library with the accuracy that the image's noise allows.
+
+    Of the settings only ``conf`` is heeded where it is stricter than the reader's own limit. Each
+    frame is read by itself. Not to be shared between threads.
+    """
+
+    def __init__(self, library: MarkerLibrary, settings: DetectionSettings | None = None) -> None:
+        self.library = library
+        self.settings = settings or DetectionSettings()
+        self._soft = SoftReader(library)
+        mirrored = replace(library, codes=library.codes[:, :, ::-1])
+        self._mirrored = SoftReader(mirrored)
+        self._cards = [
+            card(library.layout.pattern(code), library.layout.quiet) for code in library.codes
+        ]
+
+    def detect(self, grey: Grey) -> list[Detection]:
+        """All markers in ``grey`` (H, W) uint8, sorted by id.
+
+        Flags: "occluded" (a ninth of the marker or more is covered), "duplicate" (the id was seen
+        at several places; the largest is reported).
+        """
+        found: dict[int, Detection] = {}
+        for one in self._fitted(grey, self._hypotheses(grey)):
+            new = self._detection(one)
+            kept = found.get(new.id)
+            if kept is None or new.size_px > kept.size_px:
+                found[new.id] = new
+            if kept is not None:
+                found[new.id] = replace(
+                    found[new.id], flags=_with(found[new.id].flags, "duplicate")
+                )
+        return [found[i] for i in sorted(found)]
+
+    def mirrored_ids(self, grey: Grey) -> tuple[int, ...]:
+        """Ids whose mirror image is in ``grey``: the recording is mirrored. Sorted."""
+        frames = self._hypotheses(grey)
+        if not len(frames):
+            return ()
+        match = self._mirrored.match(grey, frames.homographies())
+        sure = (match.wrong <= 2) & (frames.support >= 3)
+        return tuple(sorted({int(self.library.ids[row]) for row in match.row[sure]}))
+
+    def _hypotheses(self, grey: Grey) -> Frames:
+        layout = self.library.layout
+        parts = [
+            frame_hypotheses(fine_bars(dark), layout)
+            for dark in (sharpened_dark(grey), shadowed_dark(grey))
+        ]
+        return joined(parts)
+
+    def _fitted(self, grey: Grey, frames: Frames) -> list[_Found]:
+        """Accepted markers; of several fits of one code at one place the first stands."""
+        if not len(frames):
+            return []
+        H = frames.homographies()
+        match = self._soft.match(grey, H)
+        found: list[_Found] = []
+        places: list[Floats] = []
+        for k in _order(frames, match, self.library.layout.code):
+            near = max(3.0, 0.25 * 11 * float(np.linalg.norm(frames.a[k])))
+            if any(np.linalg.norm(frames.centre[k] - p) < near for p in places):
+                continue
+            one = self._fit(grey, H[k], int(match.row[k]), int(match.turn[k]))
+            if one is not None:
+                found.append(one)
+                places.append(one.H[:2, 2] / one.H[2, 2])
+        return found
+
+    def _fit(self, grey: Grey, H: Floats, row: int, turn: int) -> _Found | None:
+        """Fit the drawing of one code, turned as it was read, and accept or refuse it."""
+        start = _turned(H, turn)
+        fit = fit_card(grey, self._cards[row], start, self.library.layout.modules)
+        if fit is None or not _sound(fit, start, self.library.layout.cornerstones):
+            return None
+        again = self._soft.match(grey, fit.H[None])
+        robust = fit.weight < COVERED
+        same = int(again.row[0]) == row and int(again.turn[0]) == 0
+        limit = min(WRONG[robust], max(1, int(self.settings.conf * 49 + 1e-9)) + WRONG[robust])
+        if not same or again.wrong[0] > limit:
+            return None
+        return _Found(row, fit.H, fit, turn, int(again.wrong[0]))
+
+    def _detection(self, one: _Found) -> Detection:
+        stones = self.library.layout.cornerstones
+        points = np.vstack([np.zeros((1, 2)), stones])
+        px = apply_homography(one.H, points)
+        J = point_jacobian(one.fit, points)
+        corners = J[1:].reshape(8, 8)
+        covered = bool(one.fit.cells.min() < CELL)
+        return Detection(
+            id=int(self.library.ids[one.row]),
+            corners_px=px[1:],
+            corners_cov_px2=corners @ one.fit.covariance @ corners.T,
+            centre_px=px[0],
+            centre_cov_px2=J[0] @ one.fit.covariance @ J[0].T,
+            raw_row=px[:, 1],
+            localiser="template",
+            bit_errors=one.wrong,
+            flags=("occluded",) if covered else (),
+        )
+
+
+def fit_card(grey: Grey, white: Singles, H: Floats, modules: int) -> Fit | None:
+    """Fit a card to the image from pose H: first coarsely, then drawn again where it was found.
+
+    None where it does not fit: no contrast, outside the image, lost.
+    """
+    pixels = marker_pixels(grey, H, modules)
+    if pixels is None:
+        return None
+    if pixels.scale > COARSE_PX:
+        pixels = marker_pixels(grey, H, modules, stride=2) or pixels
+    fit = fit_template(draw_template(white, H, FIRST_VARIANCE_PX2), pixels, robust=True)
+    variance = FIRST_VARIANCE_PX2
+    for _ in range(2):
+        if fit is None or not np.isfinite(fit.H).all():
+            return None
+        pixels = marker_pixels(grey, fit.H, modules)
+        if pixels is None:
+            return None
+        variance = float(np.clip(fit.variance_px2, *VARIANCES_PX2))
+        fit = fit_template(draw_template(white, fit.H, variance), pixels, robust=True)
+        if fit is None or abs(fit.variance_px2 - variance) < REDRAWN_PX2:
+            break
+    return fit
+
+
+def _sound(fit: Fit, start: Floats, stones: Floats) -> bool:
+    """Whether a fit may be a marker: it converged near its start, and looks like its drawing."""
+    robust = fit.weight < COVERED
+    moved = float(np.linalg.norm(fit.H[:2, 2] - start[:2, 2] / start[2, 2]))
+    module = float(np.linalg.norm(start[:2, 0])) + float(np.linalg.norm(start[:2, 1]))
+    d, e = np.diff(apply_homography(fit.H, stones)[[0, 2, 1, 3]].reshape(2, 2, 2), axis=1)[:, 0]
+    area = 0.5 * float(d[0] * e[1] - d[1] * e[0])
+    good = fit.converged and fit.ncc >= NCC[robust] and moved < 2.75 * module + 2
+    quiet = fit.rms <= RMS[robust] * fit.gain or fit.ncc >= 0.9
+    return bool(good and quiet and area >= SMALLEST_PX2)
+
+
+def _order(frames: Frames, match: SoftMatch, side: int) -> Ints:
+    """Hypotheses worth a fit, the surest first."""
+    worth: Bools = match.wrong <= TRIED_WRONG * side * side / 49
+    order = np.lexsort((-match.score, -frames.support, match.wrong))
+    out: Ints = order[worth[order]]
+    return out
+
+
+def _turned(H: Floats, turn: int) -> Floats:
+    """The pose as printed of a marker that was read ``turn`` quarter turns off."""
+    quarter = np.linalg.matrix_power(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), turn)
+    out: Floats = H @ quarter
+    return out
+
+
+def _with(flags: tuple[str, ...], word: str) -> tuple[str, ...]:
+    return flags if word in flags else (*flags, word)
