@@ -40,6 +40,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.set_defaults(verb="home:app", quiet=False, debug=False)
     verbs = parser.add_subparsers(title="verbs", metavar="VERB")
     _prepare_verbs(verbs)
+    _marker_verbs(verbs)
     _stage_verbs(verbs)
     _result_verbs(verbs)
     _other_verbs(verbs)
@@ -103,6 +104,39 @@ libraries: olive49 (the default), a library's TOML file, aruco:DICT_4X4_1000, ap
 """
 
 
+def _marker_verbs(verbs: Any) -> None:
+    parser = _add(verbs, "markers", "markers:list_", "libraries of markers, and printing them")
+    kinds = parser.add_subparsers(title="what", metavar="WHAT")
+    _add(kinds, "list", "markers:list_", "the libraries that can be named")
+    show = _add(kinds, "show", "markers:show", "markers as they look, in the terminal")
+    show.add_argument("--ids", metavar="1,2,5-9")
+    draw = _add(kinds, "draw", "markers:draw", "one marker with its quiet zone, as PNG")
+    draw.add_argument("id", type=int, metavar="ID")
+    draw.add_argument("--module-px", type=int, default=20, metavar="N", help="pixels a module")
+    sheet = _add(kinds, "sheet", "markers:sheet", "markers at exact size, as PDF or SVG")
+    sheet.add_argument("--ids", metavar="1-24", help="which ones (default: all)")
+    sheet.add_argument("--size", type=float, required=True, metavar="MM", help=_SIZE)
+    sheet.add_argument("--paper", default="A4", help="A4, A3, letter, …; A4-landscape")
+    board = _add(kinds, "board", "markers:board", "a calibration board, as PDF or SVG", _NEW_MORE)
+    board.add_argument("--board", required=True, metavar="SPEC", help="see below")
+    board.add_argument("--paper", default="A3", help="A4, A3, letter, …; A4-landscape")
+    check = _add(kinds, "check", "markers:check", "prove the distances between the codes")
+    generate = _add(kinds, "generate", "markers:generate", "draw a new library of codes")
+    generate.add_argument("--distance", type=int, required=True, metavar="D", help=_DISTANCE)
+    generate.add_argument("--mirrors", action="store_true", help="keep it to mirror images too")
+    generate.add_argument("--seed", type=int, default=1, metavar="N")
+    generate.add_argument("--code", type=int, default=7, metavar="N", help="modules a side (7)")
+    generate.add_argument("-o", dest="output", metavar="FILE.toml")
+    for kind in (show, draw, sheet, board, check):
+        kind.add_argument("--library", default="olive49", metavar="LIB", help="name or TOML file")
+    for kind in (draw, sheet, board):
+        kind.add_argument("-o", dest="output", required=True, metavar="FILE")
+
+
+_SIZE = "outer side of the dark square, mm"
+_DISTANCE = "modules in which any two codes differ at least (18: safe, 12: many codes)"
+
+
 def _stage_verbs(verbs: Any) -> None:
     for name, help_ in STAGE_VERBS.items():
         stage = _add(verbs, name, "stages:one", help_)
@@ -142,5 +176,17 @@ def _result_verbs(verbs: Any) -> None:
 
 
 def _other_verbs(verbs: Any) -> None:
+    demo = _add(verbs, "demo", "simulated:demo", "a simulated trial, measured, against its truth")
+    demo.add_argument("dir", nargs="?", metavar="DIR", help="a new folder (default: demo)")
+    demo.add_argument("--seconds", type=float, metavar="S", help="length of the recording")
+    demo.add_argument("--seed", type=int, default=1, metavar="N")
+    demo.add_argument(
+        "--beyond", action="store_true", help="25 Hz with rolling shutters: above the frame rate"
+    )
+    simulate = _add(verbs, "simulate", "simulated:simulate", "record a scenario with known truth")
+    simulate.add_argument("dir", nargs="?", metavar="DIR", help="a new trial folder")
+    simulate.add_argument("--scenario", metavar="NAME", help="see --list")
+    simulate.add_argument("--seed", type=int, default=1, metavar="N")
+    simulate.add_argument("--list", action="store_true", help="name and describe the scenarios")
     doctor = _add(verbs, "doctor", "doctor:doctor", "what works on this machine")
     doctor.add_argument("--json", action="store_true", help="for programs")

@@ -18,7 +18,9 @@ def truth_folder(folder: Path) -> Path:
     return folder.with_name(f"{folder.name}-truth")
 
 
-def simulated_trial(folder: Path, name: str, seed: int = 1, tick: Tick = silent) -> Trial:
+def simulated_trial(
+    folder: Path, name: str, seed: int = 1, tick: Tick = silent, seconds: float | None = None
+) -> Trial:
     """Record a named scenario into a new trial folder; its truth goes to FOLDER-truth.
 
     The trial holds what a technician would have and nothing else; it is labelled simulated.
@@ -28,10 +30,11 @@ def simulated_trial(folder: Path, name: str, seed: int = 1, tick: Tick = silent)
         raise UsageError(
             f"{folder} is a trial already.", "", "Choose another folder, or remove it yourself."
         )
+    chosen = scenario(name) if seconds is None else scenario(name).lasting(seconds)
     work = folder.with_name(f".{folder.name}.simulating")
     shutil.rmtree(work, ignore_errors=True)
     try:
-        recorded = simulate(work, scenario(name), seed, tick)
+        recorded = simulate(work, chosen, seed, tick)
         trial = new_trial(folder, plan_of(recorded), tick)
         truth = truth_folder(folder)
         shutil.rmtree(truth, ignore_errors=True)

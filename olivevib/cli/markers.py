@@ -1,0 +1,142 @@
+"""Verbs on marker libraries and prints: list, show, draw, sheet, board, check, generate."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from olivevib.cli import values
+from olivevib.cli.console import Console
+
+if TYPE_CHECKING:
+    from olivevib.marker import MarkerLibrary
+
+
+def _library(name: str) -> MarkerLibrary:
+    """A library by name or file; a bare file name is also looked for under markers/."""
+    from olivevib.marker import load_library
+
+    here = Path("markers") / name
+    beside = name.endswith(".toml") and not Path(name).exists() and here.exists()
+    return load_library(str(here) if beside else name)
+
+
+def list_(arguments: argparse.Namespace, console: Console) -> int:
+    """Print every library that can be named, with its number of markers and its distance."""
+    from olivevib.marker import load_library, shipped_libraries
+
+    for name in shipped_libraries():
+        print(_line(name, load_library(name)))
+    for path in sorted(Path("markers").glob("*.toml")):
+        print(_line(path.name, load_library(str(path))))
+    console.say("Foreign families are named as aruco:DICT_4X4_1000, apriltag:36h11.")
+    return 0
+
+
+def _line(name: str, library: MarkerLibrary) -> str:
+    layout = library.layout
+    mirrors = ", mirror images told apart" if library.mirrors else ""
+    return (
+        f"{name:20} {library.ids.size:5d} markers, {layout.modules} x {layout.modules} modules, "
+        f"distance {library.distance}{mirrors}"
+    )
+
+
+def show(arguments: argparse.Namespace, console: Console) -> int:
+    """Print markers as they look, dark modules as blocks."""
+    library = _library(arguments.library)
+    ids = values.id_list(arguments.ids) or tuple(int(i) for i in library.ids)
+    from olivevib.pipeline.libraries import only_known
+
+    for marker in only_known(library, ids).ids.tolist():
+        print(f"{library.name} {marker}")
+        print(_blocks(library, marker))
+    return 0
+
+
+def _blocks(library: MarkerLibrary, marker: int) -> str:
+    from olivevib.files.prints import marker_modules
+
+    return "\n".join(
+        "  " + "".join("██" if dark else "  " for dark in row)
+        for row in marker_modules(library, marker)
+    )
+
+
+def draw(arguments: argparse.Namespace, console: Console) -> int:
+    """Draw one marker with its quiet zone as PNG."""
+    from olivevib.files.prints import marker_picture, write_picture
+
+    picture = marker_picture(_library(arguments.library), arguments.id, arguments.module_px)
+    print(write_picture(Path(arguments.output), picture))
+    return 0
+
+
+def sheet(arguments: argparse.Namespace, console: Console) -> int:
+    """Print markers at exact size on sheets."""
+    from olivevib.files.prints import sheet_pages, write_pages
+    from olivevib.pipeline.libraries import only_known
+
+    library = _library(arguments.library)
+    ids = values.id_list(arguments.ids) or tuple(int(i) for i in library.ids)
+    only_known(library, ids)
+    pages = sheet_pages(library, ids, arguments.size, arguments.paper)
+    _tell(write_pages(Path(arguments.output), pages, f"{library.name} markers"), console)
+    return 0
+
+
+def board(arguments: argparse.Namespace, console: Console) -> int:
+    """Print a calibration board at exact size."""
+    from olivevib.calibration.boards import parse_board
+    from olivevib.files.prints import board_page, write_pages
+
+    page = board_page(parse_board(arguments.board), _library(arguments.library), arguments.paper)
+    _tell(write_pages(Path(arguments.output), [page], arguments.board), console)
+    return 0
+
+
+def _tell(paths: list[Path], console: Console) -> None:
+    for path in paths:
+        print(path)
+    console.say("Print at 100 % (no fit to page) and check the 150 mm ruler on the sheet.")
+
+
+def check(arguments: argparse.Namespace, console: Console) -> int:
+    """Prove the distances of a library; exit 1 where a code is too close to another."""
+    from olivevib.marker import check_library
+
+    found = check_library(_library(arguments.library))
+    print(f"{found.name}: {found.codes} codes, promised distance {found.promised}")
+    for words, value in (
+        ("to its own rotations", found.rotation),
+        ("between codes, over rotations", found.pair),
+        ("to mirror images", found.mirror),
+    ):
+        print(f"  smallest distance {words:30} {'–' if value is None else value}")
+    for close in found.too_close:
+        print(f"  TOO CLOSE: {close}")
+    print("sound" if found.sound else f"{len(found.too_close)} pairs are too close")
+    return 0 if found.sound else 1
+
+
+def generate(arguments: argparse.Namespace, console: Console) -> int:
+    """Draw a new library and write it as TOML that a person can edit."""
+    from olivevib.files.atomic import write_text_atomic
+    from olivevib.marker import MarkerLayout, generate_library, library_text
+
+    layout = MarkerLayout(modules=arguments.code + 4, code=arguments.code, bar=arguments.code)
+    library = generate_library(
+        arguments.distance, arguments.mirrors, arguments.seed, layout, tick=console.tick
+    )
+    folder = Path("markers") if Path("markers").is_dir() else Path()
+    path = Path(arguments.output) if arguments.output else folder / f"{library.name}.toml"
+    mirrors = " --mirrors" if arguments.mirrors else ""
+    made = (
+        f"made by: olivevib markers generate --distance {arguments.distance}{mirrors} "
+        f"--seed {arguments.seed} --code {arguments.code}"
+    )
+    write_text_atomic(path, library_text(library, made))
+    console.say(f"{library.ids.size} codes")
+    print(path)
+    return 0
