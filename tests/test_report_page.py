@@ -70,6 +70,7 @@ def test_page_is_well_formed_and_has_every_section_and_figure(direct):
     ids = [attrs["id"] for _, attrs in reader.tags if "id" in attrs]
     assert len(ids) == len(set(ids))
     assert {s.name for s in SECTIONS} <= set(ids)
+    assert "Not in this report" not in direct
     figures = [attrs for tag, attrs in reader.tags if tag == "svg"]
     assert len(figures) == 14
     assert all(attrs["aria-label"] and attrs["viewbox"] for attrs in figures)
@@ -182,7 +183,8 @@ def test_an_empty_trial_says_what_is_missing():
     text = reader.visible
     assert "No marker has been located in space yet." in text
     assert "How well the calibration measures distances is not known" in text
-    assert text.count("Nothing to show") > 4
+    assert "Not in this report" in text
+    assert text.count("found nothing to show") == 12
     assert "<svg" not in page
     assert not re.search(r"\b(nan|None)\b", text)
 

@@ -20,6 +20,7 @@ from olivevib.trial.summary import summary
 if TYPE_CHECKING:
     from olivevib.trial import Trial
 
+_FILES = ("video", "stamps", "file", "library")
 _RECORD = ("session", "tree", "machine", "outcome", "markers", "cameras", "accelerometers")
 
 
@@ -35,9 +36,7 @@ def content_of(trial: Trial) -> ReportContent:
         rig=trial.rig,
         calibration=trial.calibration,
         tracks=(*tracks.left, *tracks.right) if tracks else (),
-        recordings={side: asdict(record) for side, record in tracks.cameras.items()}
-        if tracks
-        else {},
+        recordings=_recordings(trial),
         trajectory=trial.trajectory,
         vibration=trial.vibration,
         comparisons=trial.comparison,
@@ -59,6 +58,15 @@ def entry_of(trial: Trial, link: str = "") -> SeasonEntry:
         simulated=trial.settings.session.simulated,
         link=link,
     )
+
+
+def _recordings(trial: Trial) -> dict[str, dict[str, Any]]:
+    if trial.tracks is None:
+        return {}
+    return {
+        side: asdict(record) | {"video": file_name(record.video)}
+        for side, record in trial.tracks.cameras.items()
+    }
 
 
 def places_of(trial: Trial) -> dict[int, str]:
@@ -87,9 +95,23 @@ def within(folder: Path, value: Any) -> Any:
 
 
 def _record(trial: Trial) -> dict[str, Any]:
-    """The session record as plain values (dates as text)."""
+    """The session record as plain values: dates as text, of files only the name."""
     plain: dict[str, Any] = trial.settings.model_dump(mode="json", include=set(_RECORD))
-    return plain
+    plain["session"].pop("simulated", None)  # the page says so in its head
+    return {name: _names_only(section) for name, section in plain.items()}
+
+
+def _names_only(value: Any, key: str = "") -> Any:
+    if isinstance(value, dict):
+        return {k: _names_only(v, k) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_names_only(v, key) for v in value]
+    return file_name(value) if key in _FILES and isinstance(value, str) else value
+
+
+def file_name(path: str) -> str:
+    """The last part of a path written on any system."""
+    return path.replace("\\", "/").rsplit("/", 1)[-1]
 
 
 def provenance(trial: Trial) -> dict[str, str]:

@@ -20,28 +20,28 @@ from olivevib.signals import State
 
 @dataclass(frozen=True)
 class Section:
-    """One heading of the page; ``name`` is its anchor."""
+    """One heading of the page; ``name`` is its anchor, ``stage`` what must have run for it."""
 
     name: str
     title: str
+    stage: str = ""
 
 
 MOST_DROPPED = 20  # dropped calibration views that are named
 MOST_PAIRS = 66  # distances listed as a table: 12 markers
-
 SECTIONS = (
-    Section("markers", "Markers"),
-    Section("paths", "Cameras, markers and paths"),
-    Section("motion", "Displacement"),
-    Section("frequency", "Frequency"),
-    Section("spectra", "Amplitude spectrum"),
-    Section("psd", "Power spectral density"),
-    Section("orbits", "Orbits"),
-    Section("comparison", "Camera against accelerometer"),
-    Section("distances", "Distances between markers"),
-    Section("seen", "When each marker was seen"),
-    Section("sigma", "How well each position is known"),
-    Section("calibration", "Rig and calibration"),
+    Section("markers", "Markers", "reconstruct"),
+    Section("paths", "Cameras, markers and paths", "calibrate"),
+    Section("motion", "Displacement", "reconstruct"),
+    Section("frequency", "Frequency", "analyse"),
+    Section("spectra", "Amplitude spectrum", "analyse"),
+    Section("psd", "Power spectral density", "analyse"),
+    Section("orbits", "Orbits", "reconstruct"),
+    Section("comparison", "Camera against accelerometer", "compare"),
+    Section("distances", "Distances between markers", "reconstruct"),
+    Section("seen", "When each marker was seen", "track"),
+    Section("sigma", "How well each position is known", "reconstruct"),
+    Section("calibration", "Rig and calibration", "calibrate"),
     Section("timing", "Timing"),
     Section("record", "Session record"),
     Section("provenance", "Provenance"),
@@ -64,12 +64,14 @@ def render_page(content: ReportContent, tick: Tick = silent) -> str:
     drawn: dict[str, list[Plate]] = defaultdict(list)
     for plate in plates(content, tick):
         drawn[plate.section].append(plate)
+    shown = [s for s in SECTIONS if not s.stage or _has(content, s, bool(drawn.get(s.name)))]
     statuses = {line.status for line in content.lines().values()}
     template = environment().get_template("trial.html.j2")
     return template.render(
         name=clean(content.name),
         simulated=content.simulated,
-        sections=SECTIONS,
+        sections=shown,
+        missing=[(s.title, _why(content, s)) for s in SECTIONS if s not in shown],
         plates=drawn,
         verdict=verdict(content),
         cautions=[(clean(c.code, 60), clean(c.text), clean(c.remedy)) for c in content.cautions],
@@ -92,7 +94,6 @@ def render_page(content: ReportContent, tick: Tick = silent) -> str:
             (_words(c), tables.comparison_pairs(content, c), tables.comparison_lines(c))
             for c in content.comparisons
         ],
-        not_compared=_not_compared(content),
         frame=clean(content.trajectory.frame) if content.trajectory else "",
         phases=[
             (clean(p.name, 30), f"{p.start_s:.2f} – {p.end_s:.2f}\u00a0s") for p in content.phases
@@ -143,7 +144,19 @@ def _words(comparison: Comparison) -> str:
     return f"{clean(comparison.sensor, 60)} — {comparison.verdict}: {reason}."
 
 
-def _not_compared(content: ReportContent) -> str:
-    stage = (content.summary.get("stages") or {}).get("compare") or {}
-    reason = clean(stage.get("reason") or "").rstrip(".")
-    return "Not compared" + (f": {reason}." if reason else ".")
+def _has(content: ReportContent, section: Section, figures: bool) -> bool:
+    """Whether a section has anything to show."""
+    if section.name == "markers":
+        return bool(content.summary.get("markers"))
+    if section.name == "comparison":
+        return bool(content.comparisons)
+    return figures or (section.name == "calibration" and content.rig is not None)
+
+
+def _why(content: ReportContent, section: Section) -> str:
+    """Why a section has nothing to show: the state of the stage that it needs."""
+    stage = (content.summary.get("stages") or {}).get(section.stage) or {}
+    state, reason = clean(stage.get("state") or ""), clean(stage.get("reason") or "")
+    if not state or state == "done":
+        return f"the stage {section.stage} found nothing to show"
+    return f"the stage {section.stage} is {state}" + (f" ({reason})" if reason else "")

@@ -128,7 +128,7 @@ def _curve(
     ax.semilogy(spectrum.f_hz[1:], shown[1:], color=colour, lw=0.8)
     where = seen_at_hz(line, nyquist_hz)
     floor = noise_floor(spectrum.f_hz, values, where, spectrum.resolution_hz)
-    if floor > 0:
+    if floor > 0 and spectrum.quantity == "displacement":  # elsewhere noise is not level
         ax.axhline(floor, color=canvas.QUIET, lw=0.7, ls=(0, (1, 2)))
     if np.isfinite(where):
         ax.axvline(where, color=canvas.MARK, lw=0.7, ls=(0, (4, 2)), zorder=1)
