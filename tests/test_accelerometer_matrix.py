@@ -209,7 +209,7 @@ def test_a_missing_unit_is_proposed_and_taken_only_when_accepted(tmp_path: Path)
     path = tmp_path / "logger.csv"
     rows = (f"{t:.4f},{x:.6f},{y:.6f},{z:.6f}" for t, (x, y, z) in zip(t_s, a / G, strict=True))
     path.write_text("t,x,y,z\n" + "\n".join(rows))
-    with pytest.raises(InputError, match='(?s)gravity in g.*unit = "g"'):
+    with pytest.raises(InputError, match=r'(?s)gravity in g.*unit = "g"'):
         read_accelerometer(path)
     accepted = read_accelerometer(path, ImportOptions(unit="rest"))
     assert accepted.unit_basis == "proposed from rest magnitude"

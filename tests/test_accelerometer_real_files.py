@@ -108,3 +108,60 @@ def test_a_gyroscope_is_refused_by_name(shared_data: Path) -> None:
     with pytest.raises(InputError, match=r"(?s)no acceleration.*Gyroscope x \(rad/s\)") as caught:
         read(shared_data, "phyphox/gyroscope_raw_data.csv")
     assert "gyroscope in rad/s" in caught.value.why
+
+
+def test_the_hammer_record_of_labview(shared_data: Path) -> None:
+    record = read(shared_data, "beam_optical_vs_accel/acceleration.lvm")
+    g = record.samples.values[:, 0] / 9.80665
+    assert record.samples.values.shape == (50030, 1)
+    assert record.rate_hz == pytest.approx(50000, rel=1e-9)
+    assert np.nanmax(np.abs(g)) == pytest.approx(35.458, abs=0.001)
+    assert record.columns_refused == (("Force (Trigger)", "force in Newtons, no acceleration"),)
+    assert (record.source_unit, record.unit_basis) == ("g", "column header")
+    assert record.clock.start is not None
+    assert record.clock.start.isoformat() == "2018-12-17T10:18:21.109129"
+
+
+def test_universal_files_with_accelerations(shared_data: Path) -> None:
+    binary = read(shared_data, "uff58/binary8byte.uff")
+    assert (binary.samples.values.shape, binary.source_unit) == ((250, 1), "g")
+    assert binary.rate_hz == pytest.approx(100)
+    np.testing.assert_allclose(
+        binary.samples.values[:, 0] / 9.80665, np.sin(2 * np.pi * 5 * binary.samples.t_s), atol=2e-6
+    )
+    text = read(shared_data, "uff58/time-history-not-all-columns-filled.uff")
+    assert (text.samples.values.shape, text.source_unit) == ((13, 1), "m/s2")
+    assert text.rate_hz == pytest.approx(20000)
+    assert text.samples.values[-1, 0] == pytest.approx(-5.84096)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("uff58/sample_dataset58_psd.uff", "power spectral density"),
+        ("uff58/non_ascii_header.uff", "frequency response function"),
+        ("uff58/dataset_milestone_in_header.uff", "sound pressure in Pa"),
+        ("beam_optical_vs_accel/camera.cih", ""),
+        ("beam_optical_vs_accel/displacements_lk.npy", "(15, 3750, 2)"),
+    ],
+)
+def test_what_is_rightly_refused(shared_data: Path, name: str, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read(shared_data, name)
+    assert words in caught.value.why
+    assert caught.value.remedy
+
+
+def test_endaq_recordings_need_their_library_and_then_are_right(shared_data: Path) -> None:
+    name = "endaq_ide/SSX70065.IDE"
+    try:
+        import idelib  # noqa: F401
+    except ImportError:
+        with pytest.raises(InputError, match=r"(?s)idelib.*pip install idelib"):
+            read(shared_data, name)
+        return
+    record = read(shared_data, name)
+    assert record.samples.values.shape == (37361, 3)
+    assert record.rate_hz == pytest.approx(3072.14, abs=0.05)
+    with pytest.raises(InputError, match="several accelerometers"):
+        read(shared_data, "endaq_ide/S2-D8D16_two_accelerometers.ide")

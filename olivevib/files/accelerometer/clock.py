@@ -43,7 +43,7 @@ def stamp_timing(stamps_s: Floats, same: Bools, start: datetime | None, source: 
     the clock starts anew within the file.
     """
     if (np.diff(stamps_s) > 0).all() and stamps_s.size > 1:  # as most files are (NaN fails, too)
-        t_s, clock = _fit(stamps_s, start, source, even=False)
+        t_s, clock = _fit(stamps_s, start, source, _quantum(stamps_s))
         return Timing(np.ones(t_s.size, np.bool_), t_s, clock)
     stamps = _unwrapped(stamps_s)
     keep = np.isfinite(stamps)
@@ -61,7 +61,7 @@ def stamp_timing(stamps_s: Floats, same: Bools, start: datetime | None, source: 
             "At least two are needed.",
             "Choose the whole recording, or give rate_hz.",
         )
-    t_s, clock = _fit(t_s, start, source, even=bool(tied.any()))
+    t_s, clock = _fit(t_s, start, source, _quantum(stamps[keep]))
     counts = {"duplicates": int(tied.sum()), "backward": int(backward.sum())}
     fields = {**clock.__dict__, **counts, "dropped_rows": int((~keep).sum())}
     return Timing(keep, t_s, Clock(**fields))
@@ -140,10 +140,10 @@ def _spread_ties(stamps: Floats) -> Floats:
 
 
 def _fit(
-    stamps: Floats, start: datetime | None, source: str, *, even: bool
+    stamps: Floats, start: datetime | None, source: str, quantum_s: float
 ) -> tuple[Floats, Clock]:
     steps = np.diff(stamps)
-    holes = _gap_steps(steps)
+    holes = _gap_steps(steps, quantum_s)
     sequence = _sequence(stamps, holes)
     intercept, period = _line(sequence, stamps)
     _check_rate(1 / period, source)
@@ -151,10 +151,11 @@ def _fit(
     residual = stamps - line_s
     scatter = math.sqrt(float(residual @ residual) / residual.size)
     roughness = _roughness(residual, scatter)
-    wanders = not even and scatter > 1e-3 * period and roughness < 0.4 and stamps.size > 10
+    slow = scatter > max(1e-3 * period, 0.6 * quantum_s) and roughness < 0.4
+    wanders = slow and stamps.size > 10
     sigma = _period_sigma(sequence, scatter, roughness)
     if wanders:
-        period, sigma = _middle_period(sequence, stamps)
+        period, sigma = _middle_period(stamps)
     clock = Clock(
         rate_hz=1 / period,
         rate_sigma_hz=sigma / period**2,
@@ -167,17 +168,34 @@ def _fit(
     return (stamps if wanders else line_s), clock
 
 
-def _gap_steps(steps: Floats) -> Ints:
-    """The steps that are holes: above 1.5 periods; of a jittery clock far beyond its 99 %."""
+def _gap_steps(steps: Floats, quantum_s: float) -> Ints:
+    """The steps that are holes.
+
+    Of a steady, finely stamped clock those of two periods and more; of a jittery one those far
+    beyond its 99 %; of coarse stamps (whole ms at 1 kHz) those that rounding cannot explain.
+    """
     if steps.max() < 1.5 * steps.min():
         return np.empty(0, np.int64)
-    usual = float(np.median(steps))
+    usual = float(steps[steps <= np.quantile(steps, 0.99)].mean())
+    quantum = quantum_s / usual
     ratio = steps / usual
-    off_grid = ratio - np.rint(ratio)
-    if float(np.sqrt(np.mean(off_grid**2))) < 0.1:
-        return np.flatnonzero(np.rint(ratio) > 1)
-    limit = max(1.6, 1 + 3 * (float(np.quantile(ratio, 0.99)) - 1))
-    return np.flatnonzero(ratio > limit)
+    if quantum < 0.2:
+        ratio = steps / float(np.median(steps))
+        off_grid = ratio - np.rint(ratio)
+        if float(np.sqrt(np.mean(off_grid**2))) < 0.1:
+            return np.flatnonzero(np.rint(ratio) > 1)
+    jitter = float(np.quantile(ratio, 0.99)) - 1
+    return np.flatnonzero(ratio > max(1.6, 1 + 1.5 * quantum, 1 + 3 * jitter))
+
+
+def _quantum(stamps: Floats) -> float:
+    """The decimal step in which stamps were written, s; 0 where they are finer than 1 ns."""
+    some = stamps[: min(stamps.size, 2000)]
+    for quantum in 10.0 ** -np.arange(0, 10):
+        ticks = (some - some[0]) / quantum
+        if float(np.abs(ticks - np.rint(ticks)).max()) < 1e-3:
+            return float(quantum)
+    return 0.0
 
 
 def _sequence(stamps: Floats, holes: Ints) -> Ints:
@@ -190,9 +208,9 @@ def _sequence(stamps: Floats, holes: Ints) -> Ints:
     if not holes.size:
         return plain
     steps = np.diff(stamps)
-    period = float(np.median(np.delete(steps, holes)))
-    near = steps[steps < 1.5 * period]
-    period = float(near.mean()) if near.size else period
+    period = (
+        float(np.delete(steps, holes).mean()) if holes.size < steps.size else float(steps.min())
+    )
     lost = np.zeros(stamps.size, dtype=np.int64)
     edges = np.concatenate([[0], holes + 1, [stamps.size]])
     level = stamps - period * plain
@@ -225,13 +243,13 @@ def _roughness(residual: Floats, scatter: float) -> float:
     return math.sqrt(float(steps @ steps) / steps.size) / (math.sqrt(2.0) * scatter)
 
 
-def _middle_period(sequence: Ints, stamps: Floats) -> tuple[float, float]:
+def _middle_period(stamps: Floats) -> tuple[float, float]:
     """Period of a clock that wanders: median over pairs a quarter of the record apart, and spread.
 
     A start-up of the logger, a few gaps and what it does to catch up move it little.
     """
     apart = max(1, stamps.size // 4)
-    slopes = (stamps[apart:] - stamps[:-apart]) / (sequence[apart:] - sequence[:-apart])
+    slopes = (stamps[apart:] - stamps[:-apart]) / apart
     middle = float(np.median(slopes))
     return middle, 1.4826 * float(np.median(np.abs(slopes - middle)))
 

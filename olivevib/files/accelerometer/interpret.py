@@ -25,11 +25,13 @@ from olivevib.files.accelerometer.scale import find_scale
 from olivevib.files.accelerometer.stamps import read_stamps
 from olivevib.signals import Samples
 
+LARGEST = 1e12  # in the file's unit
+
 
 def interpret(table: Table, options: ImportOptions, source: str) -> AccelerometerRecord:
     """Decide axes, times and unit of a table; InputError where the file leaves one open."""
     choice = choose_columns(table, options, source)
-    raw = np.stack([table.channels[k].values for k, _ in choice.axes]).T
+    raw = np.stack([_possible(table.channels[k].values) for k, _ in choice.axes]).T
     timing, more = _timing(table, choice, raw, options, source)
     raw = raw if timing.keep.all() else raw[timing.keep]
     if not np.isfinite(raw).any():
@@ -62,6 +64,13 @@ def interpret(table: Table, options: ImportOptions, source: str) -> Acceleromete
     )
     cautions = (*table.cautions, *more, *scale.cautions, *clock_cautions(record))
     return replace(record, cautions=(*cautions, *record_cautions(record, choice)))
+
+
+def _possible(values: Floats) -> Floats:
+    """The values (N,) with NaN for numbers beyond any sensor's: damaged bytes, not readings."""
+    if float(np.fmax.reduce(np.abs(values), initial=0.0)) < LARGEST:
+        return values
+    return np.asarray(np.where(np.abs(values) < LARGEST, values, np.nan))
 
 
 def _format(table: Table) -> str:

@@ -42,10 +42,11 @@ def find_scale(
     if options.unit is not None and options.unit != "rest":
         unit = _declared(options.unit, source)
         return _of_units([unit] * count, DECLARED, rest, options, source)
-    if options.per_g is not None:
-        factor = np.full(count, GRAVITY_M_S2 / options.per_g)
-        return Scale(factor, f"1/{options.per_g:g} g", DECLARED)
     units = [choice.meanings[k].unit for k, _ in choice.axes]
+    if options.per_g is not None:
+        names = {u.name for u in units if u is not None}
+        factor = np.full(count, GRAVITY_M_S2 / options.per_g)
+        return Scale(factor, names.pop() if len(names) == 1 else "counts", DECLARED)
     usable = [u for u in units if u is not None and u.quantity in (ACCELERATION, RAW)]
     if len(usable) == count:
         return _of_units(usable, HEADER, rest, options, source)

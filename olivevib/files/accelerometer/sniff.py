@@ -71,6 +71,8 @@ def sniff(
     """
     hints = _hints(lines)
     tail = [x for x in lines if x.strip() and not x.lstrip().startswith(COMMENTS)][-200:]
+    if not tail:
+        return None
     sample = tail[-1 :: -max(1, len(tail) // 30)]
     present = {s for s in ("\t", ";", ",", "|", " ") if any(s in line for line in sample)} or {","}
     scored = [
@@ -80,7 +82,7 @@ def sniff(
         and d.separator == (separator or d.separator)
         and d.decimal == (decimal or d.decimal)
     ]
-    if not tail or not scored:
+    if not scored:
         return None
     best = max(score for score, _ in scored)
     if best < 0.4:

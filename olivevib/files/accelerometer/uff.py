@@ -238,8 +238,9 @@ def _table(sets: list[_Set], source: str) -> Table:
         text = f"{len(sets) - len(mates)} datasets of {source} have other times and were left out."
         cautions = (Caution("sensor-sets-left-out", text, "Export them as a file of their own."),)
     even = leader.x is None
-    if even and leader.step_s <= 0:
-        raise _damaged(source, f"Its abscissa step is {leader.step_s:g}.")
+    if even and not (leader.step_s > 0 and abs(leader.x0_s) < 1e10):
+        why = f"Its abscissa begins at {leader.x0_s:g} with steps of {leader.step_s:g}."
+        raise _damaged(source, why)
     return Table(
         "UFF58",
         tuple(Channel(s.name, s.unit, s.y) for s in mates),
