@@ -10,6 +10,7 @@ from typing import TextIO
 from olivevib.errors import Caution
 
 REDRAW_S = 0.1
+PLAIN_S = 10.0  # without a terminal: one line of progress at most this often
 BAR = 24
 
 
@@ -20,7 +21,7 @@ class Console:
         self._stream = stream
         self._quiet = quiet
         self._live = stream.isatty() and not quiet
-        self._drawn = 0.0
+        self._drawn = time.monotonic()
         self._started = time.monotonic()
         self._note = ""
         self._open = False
@@ -50,10 +51,12 @@ class Console:
         now = time.monotonic()
         if note != self._note:
             self._note, self._started = note, now
-            if not self._live:
-                self.say(f"  {note} …")
         finished = total is not None and done >= total
-        if self._live and (finished or now - self._drawn > REDRAW_S):
+        if not self._live:
+            if now - self._drawn > PLAIN_S:
+                self._drawn = now
+                self.say(f"  {note} {done}" + (f"/{total}" if total else ""))
+        elif finished or now - self._drawn > REDRAW_S:
             self._drawn = now
             width = shutil.get_terminal_size().columns - 1
             line = f"  {note}  {_bar(done, total)}{_left(done, total, now - self._started)}"
