@@ -12,7 +12,6 @@ from olivevib.signals import GRAVITY_M_S2
 from olivevib.simulation.motion import acceleration_m_s2
 from olivevib.simulation.scene import Body
 
-
 Vector = tuple[float, float, float]
 
 

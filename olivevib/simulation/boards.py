@@ -28,7 +28,8 @@ def board_planar(board: Board, codes: MarkerLibrary | None = None) -> Planar:
 
 
 def _at(boxes_modules: Floats, module_mm: float, x_mm: float, y_mm: float) -> Floats:
-    return boxes_modules * module_mm + np.array([x_mm, y_mm, x_mm, y_mm])
+    out: Floats = boxes_modules * module_mm + np.array([x_mm, y_mm, x_mm, y_mm])
+    return out
 
 
 def _squares(columns: int, rows: int, side: float, start: float, dark_first: bool) -> Floats:

@@ -1,7 +1,7 @@
 """One camera's pictures of a scene: every row at its own time, every edge area-averaged.
 
-A print is sampled on a grid of SUB x SUB points a pixel at the mid-points of the exposure, each
-row with the pose of its own time; the sum is filtered by the pixel's area and what the lens's blur
+A print is sampled on a grid of SUB x SUB points a pixel in each sub-exposure, each row with the
+pose of its own time; the sum is filtered by the pixel's area and what the lens's blur
 leaves after the texture's own, and laid over the backdrop. Light, noise, gamma and rounding follow.
 """
 
@@ -64,7 +64,9 @@ class Renderer:
             light += noise
         if optics.gamma != 1:
             np.clip(light, 0, None, out=light)
-            light = 255 * (light / 255) ** np.float32(1 / optics.gamma)
+            light /= 255
+            np.power(light, np.float32(1 / optics.gamma), out=light)
+            light *= 255
         np.rint(light, out=light)
         return np.clip(light, 0, 255, out=light).astype(np.uint8)
 
@@ -100,10 +102,11 @@ class Renderer:
         part += over * (np.float32(leaf.dn) - part)
 
     def _lay(self, picture: Image, body: Body, exposed_s: float) -> None:
-        box = _box(self._camera, body, exposed_s)
-        if box is None:
+        found = reach(self._camera, body, exposed_s)
+        if found is None:
             return
-        white, card = self.card(body, exposed_s, box)
+        box, path_px = found
+        white, card = self.card(body, exposed_s, box, path_px)
         optics = self._camera.optics
         dark = np.float32(optics.dark_dn * body.shade)
         contrast = np.float32((optics.white_dn - optics.dark_dn) * body.shade)
@@ -111,7 +114,7 @@ class Renderer:
         part *= 1 - card
         part += dark * card + contrast * white
 
-    def card(self, body: Body, exposed_s: float, box: Box) -> tuple[Image, Image]:
+    def card(self, body: Body, exposed_s: float, box: Box, path_px: float) -> tuple[Image, Image]:
         """Share of white and share of card in each pixel of ``box``, exposure and blur included."""
         camera = self._camera
         stretch = _stretch(camera, body, exposed_s)
@@ -121,7 +124,7 @@ class Renderer:
         wide = (x0 - pad, y0 - pad, x1 + pad, y1 + pad)
         shape = (2, (wide[3] - wide[1]) * SUB, (wide[2] - wide[0]) * SUB)
         fine = np.zeros(shape, dtype=np.float32)
-        offsets = camera.optics.mid_points_s
+        offsets = camera.optics.moments_s(path_px)
         for offset in offsets:
             self._sample(fine, body, exposed_s + float(offset), wide, texture)
         fine /= np.float32(len(offsets))
@@ -129,7 +132,7 @@ class Renderer:
         return white, part
 
     def _textures_of(self, planar: Planar) -> Textures:
-        key = id(planar)  # the scene keeps its prints alive
+        key = id(planar)  # Textures keeps the print alive, so no other takes its id
         if key not in self._textures:
             self._textures[key] = Textures(planar)
         return self._textures[key]
@@ -141,8 +144,9 @@ class Renderer:
         x0, y0, x1, y1 = (v + BORDER_PX for v in box)
         X, Y = self._rays[0][y0:y1, x0:x1], self._rays[1][y0:y1, x0:x1]
         row_time = self._camera.model.row_time_s
-        rows = np.arange(box[1], box[3]) if row_time else np.zeros(1)
-        back = plane_from_ray(self._camera, body, t_s + row_time * rows)[:, :, :, None]
+        rows = np.arange(box[1], box[3], dtype=np.float64) if row_time else np.zeros(1)
+        times: Floats = t_s + row_time * rows
+        back = plane_from_ray(self._camera, body, times)[:, :, :, None]
         # Linear in X and Y, so that linear interpolation is exact but for the lens's curvature.
         size = fine.shape[:0:-1]
         mm = [back[:, i, 0] * X + back[:, i, 1] * Y + back[:, i, 2] for i in (0, 1, 2)]
@@ -151,8 +155,8 @@ class Renderer:
         for i in (0, 1):
             texels = (mm[i] - texture.origin_mm[i] * mm[2]) / texture.texel_mm[i]
             maps.append(_upsampled(texels, size) / w)
-        for layer, image in zip(fine, (texture.white, texture.card), strict=True):
-            layer += cv2.remap(image, maps[0], maps[1], cv2.INTER_LINEAR)
+        for k, image in enumerate((texture.white, texture.card)):
+            fine[k] += cv2.remap(image, maps[0], maps[1], cv2.INTER_LINEAR)
 
 
 def _upsampled(values: Floats, size: tuple[int, ...]) -> Image:
@@ -186,24 +190,29 @@ def _inside(box: Box, camera: Camera) -> Box | None:
     return (x0, y0, x1, y1) if x1 > x0 and y1 > y0 else None
 
 
-def _box(camera: Camera, body: Body, exposed_s: float) -> Box | None:
-    """The pixels that the card can reach during the exposure; None when it is out of the picture."""
+def reach(camera: Camera, body: Body, exposed_s: float) -> tuple[Box, float] | None:
+    """The pixels that the card can reach during the exposure, and how far it goes in px.
+
+    None: it is out of the picture.
+    """
     corners = body.planar.card_corners_mm
     middle = camera.project(body.points_mm(exposed_s, corners)[0])
     if not np.isfinite(middle).all():
         return None
     rows = np.array([middle[:, 1].min(), middle[:, 1].max()])
     times = exposed_s + camera.model.row_time_s * rows
-    half = camera.optics.exposure_s / 2
-    moments = np.concatenate([times - half, times, times + half])
-    px = camera.project(body.points_mm(moments, corners).reshape(-1, 3))
+    moments = times + camera.optics.exposure_s * np.linspace(-0.5, 0.5, 5)[:, None]
+    px = camera.project(body.points_mm(moments.ravel(), corners).reshape(-1, 3))
     if not np.isfinite(px).all():
         return None
     rim = 2 + REACH * camera.optics.psf_px
     low, high = np.floor(px.min(axis=0) - rim), np.ceil(px.max(axis=0) + rim) + 1
     if np.abs([low, high]).max() > 1e6:
         return None
-    return _inside((int(low[0]), int(low[1]), int(high[0]), int(high[1])), camera)
+    box = _inside((int(low[0]), int(low[1]), int(high[0]), int(high[1])), camera)
+    steps = np.diff(px.reshape(5, 2, 4, 2), axis=0)
+    path = float(np.linalg.norm(steps, axis=-1).sum(axis=0).max())
+    return None if box is None else (box, path)
 
 
 def _stretch(camera: Camera, body: Body, exposed_s: float) -> Floats:
@@ -231,8 +240,8 @@ def _kernels(
 
 def _kernel(sigma: float) -> Floats:
     """The sum of SUB samples, blurred with ``sigma`` samples; symmetric, its sum is 1."""
-    reach = int(np.ceil(REACH * sigma))
-    x = np.arange(-reach, reach + 1)
+    ends = int(np.ceil(REACH * sigma))
+    x = np.arange(-ends, ends + 1)
     blur = np.exp(-0.5 * (x / sigma) ** 2)
     kernel = np.convolve(blur, np.ones(SUB))
     out: Floats = kernel / kernel.sum()

@@ -74,9 +74,9 @@ class CameraPlan:
     size_px: tuple[int, int] = (1280, 720)
     focal_px: float = 950.0
     baseline_mm: float = 420.0
-    optics: Optics = Optics()
-    left: Clock = Clock()
-    right: Clock = Clock()
+    optics: Optics = field(default_factory=Optics)
+    left: Clock = field(default_factory=Clock)
+    right: Clock = field(default_factory=Clock)
     row_time_s: tuple[float, float] = (0.0, 0.0)  # 0: global shutter
 
 
@@ -114,7 +114,7 @@ class Scenario:
     cameras: CameraPlan = CameraPlan()
     light: LightPlan = LightPlan()
     encoding: Encoding = Encoding()
-    sensor: Sensor | None = field(default=None)
+    sensor: Sensor | None = None
 
     @property
     def frames(self) -> int:
@@ -219,7 +219,7 @@ LEAVES = replace(
 ROUGH = replace(
     DEMO,
     name="rough",
-    title="the demo's tree through poor webcams: late stamps, lost frames, gamma, strong MJPEG, 6 s",
+    title="the demo's tree through poor webcams: jitter, lost frames, gamma, strong MJPEG, 6 s",
     seconds=6.0,
     what=Shaking(12.0, Phases(0.8, 0.8, 4.8, 0.4)),
     cameras=CameraPlan(

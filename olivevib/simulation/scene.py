@@ -13,18 +13,21 @@ from olivevib.simulation.motion import Motion
 from olivevib.simulation.planar import Planar
 from olivevib.simulation.surroundings import Surroundings
 
+MOST_SUB_EXPOSURES = 200
+STILL_PX = 1e-3
+
 
 @dataclass(frozen=True)
 class Optics:
     """How light becomes numbers in one camera; DN are grey levels of the 8-bit picture.
 
-    psf_px: sigma of the Gaussian blur beside the pixel's own area. The exposure is integrated at
-    the mid-points of ``sub_exposures``. Noise variance is read² + shot · DN, before gamma.
+    psf_px: sigma of the Gaussian blur beside the pixel's own area. Sub-exposures are so short that
+    nothing moves more than ``step_px`` in one. Noise variance is read² + shot · DN, before gamma.
     """
 
     psf_px: float = 0.7
     exposure_s: float = 0.002
-    sub_exposures: int = 4
+    step_px: float = 0.5
     dark_dn: float = 40.0
     white_dn: float = 210.0
     read_noise_dn: float = 1.0
@@ -34,14 +37,23 @@ class Optics:
     def __post_init__(self) -> None:
         if not 0.3 <= self.psf_px <= 8:
             raise ValueError(f"psf_px must lie in 0.3…8, got {self.psf_px}")
-        if self.exposure_s < 0 or self.sub_exposures < 1 or self.gamma <= 0:
-            raise ValueError(f"exposure, sub-exposures and gamma must be positive: {self}")
+        if self.exposure_s < 0 or self.step_px <= 0 or self.gamma <= 0:
+            raise ValueError(f"exposure, step_px and gamma must be positive: {self}")
 
-    @property
-    def mid_points_s(self) -> Floats:
-        """Mid-points of the sub-exposures from the middle of the exposure."""
-        k = self.sub_exposures if self.exposure_s > 0 else 1
-        return self.exposure_s * ((np.arange(k) + 0.5) / k - 0.5)
+    def moments_s(self, path_px: float) -> Floats:
+        """When to look, from the middle of an exposure in which a print goes ``path_px``.
+
+        Two moments around the mid-point of each sub-exposure (Gauss's rule): their mean and spread
+        are those of the exposure itself, so that blur and amplitude come out right to fourth
+        order. What stands still is looked at once.
+        """
+        if path_px < STILL_PX:
+            return np.zeros(1)
+        k = int(np.clip(np.ceil(path_px / self.step_px), 1, MOST_SUB_EXPOSURES))
+        middles = (np.arange(k, dtype=np.float64) + 0.5) / k - 0.5
+        around = np.array([-0.5, 0.5]) / (np.sqrt(3) * k)
+        out: Floats = self.exposure_s * (middles[:, None] + around).ravel()
+        return out
 
 
 @dataclass(frozen=True)
@@ -61,7 +73,7 @@ class Clock:
     def exposed_s(self, frames: int) -> Floats:
         """Trial time (N,) of the middle of row 0's exposure, dropped frames included."""
         period = (1 + self.drift_ppm * 1e-6) / self.fps
-        out: Floats = self.offset_s + np.arange(frames) * period
+        out: Floats = self.offset_s + np.arange(frames, dtype=np.float64) * period
         return out
 
     def stamps_us(self, frames: int, rng: np.random.Generator) -> Ints:
@@ -69,7 +81,8 @@ class Clock:
         most = 0.45 / self.fps
         jitter = np.clip(self.jitter_s * rng.standard_normal(frames), -most, most)
         jitter[:1] = 0.0
-        return np.rint((np.arange(frames) / self.fps + jitter) * 1e6).astype(np.int64)
+        stamps: Ints = np.rint((np.arange(frames) / self.fps + jitter) * 1e6).astype(np.int64)
+        return stamps
 
     def delivered(self, frames: int, rng: np.random.Generator) -> Bools:
         """Which frames (N,) arrive; the first and the last always do."""
@@ -86,8 +99,8 @@ class Camera:
     """
 
     model: CameraModel
-    optics: Optics = Optics()
-    clock: Clock = Clock()
+    optics: Optics = field(default_factory=Optics)
+    clock: Clock = field(default_factory=Clock)
     R: Floats = field(default_factory=lambda: np.eye(3))
     t_mm: Floats = field(default_factory=lambda: np.zeros(3))
 
@@ -111,7 +124,7 @@ class Body:
     planar: Planar
     R0: Floats
     t0_mm: Floats
-    motion: Motion = Motion()
+    motion: Motion = field(default_factory=Motion)
     shade: float = 1.0
 
     def __post_init__(self) -> None:

@@ -14,7 +14,7 @@ from olivevib.simulation import motion
 from olivevib.simulation.boards import board_planar
 from olivevib.simulation.motion import Motion, Sway
 from olivevib.simulation.planar import Planar, foreign_dictionary, marker_planar
-from olivevib.simulation.scenarios import Release, Scenario, Shaking, Still, ToyCars
+from olivevib.simulation.scenarios import Release, Scenario, Shaking, ToyCars
 from olivevib.simulation.scene import Body, Camera, Scene
 from olivevib.simulation.surroundings import Leaf, Limb, Surroundings
 
@@ -212,8 +212,9 @@ def _around(scenario: Scenario, markers: tuple[Marker, ...], seed: int) -> Surro
 def _limbs(markers: tuple[Marker, ...]) -> tuple[Limb, ...]:
     """A trunk, and a branch from its fork to behind each marker."""
     fork = np.array([0.0, 150.0, 1560.0])
+    behind = np.array([0.0, 0.0, 60.0])
     trunk = Limb(np.array([20.0, 1200.0, 1560.0]), fork, 75.0, 66.0)
-    branches = [Limb(fork, m.body.t0_mm + [0.0, 0.0, 60.0], 16.0, 74.0) for m in markers]
+    branches = [Limb(fork, m.body.t0_mm + behind, 16.0, 74.0) for m in markers]
     return (trunk, *branches)
 
 
@@ -282,8 +283,3 @@ def _waved(scenario: Scenario, planar: Planar, rng: np.random.Generator) -> Body
         Sway(0.17, np.array([0, 0, reach[2], 0, 0, 0.3]), phases[2]),
     )
     return Body(planar.moved(-_middle(planar)[:2]), np.eye(3), middle, Motion(terms))
-
-
-def still(scenario: Scenario) -> bool:
-    """Whether nothing moves in this scenario."""
-    return isinstance(scenario.what, Still)

@@ -27,7 +27,7 @@ class Leaf:
     half_mm: tuple[float, float]  # half length, half width
     turn_rad: float
     dn: float
-    motion: Motion = Motion()
+    motion: Motion = field(default_factory=Motion)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre_mm", floats("centre_mm", self.centre_mm, (3,)))
@@ -58,7 +58,8 @@ class Dapple:
 class Surroundings:
     """All that is neither camera nor marker; the light is a factor on everything seen.
 
-    gradient: the light runs from 1 - gradient to 1 + gradient across the picture along gradient_rad.
+    gradient: the light runs from 1 - gradient to 1 + gradient across the picture, along
+    gradient_rad.
     """
 
     backdrop_dn: float = 110.0
@@ -118,7 +119,7 @@ def _draw_limb(picture: Image, project: Project, limb: Limb) -> None:
     px = project(np.vstack([ends, ends[:1] + side]))
     if not np.isfinite(px).all():
         return
-    thick = max(int(round(2 * float(np.linalg.norm(px[2] - px[0])))), 1)
+    thick = max(round(2 * float(np.linalg.norm(px[2] - px[0]))), 1)
     a, b = (tuple(int(v) for v in np.rint(p)) for p in px[:2])
     cv2.line(picture, a, b, limb.dn, thick)
 
@@ -126,12 +127,13 @@ def _draw_limb(picture: Image, project: Project, limb: Limb) -> None:
 def cover(leaf: Leaf, t_s: float, project: Project, psf_px: float) -> tuple[Floats, Image] | None:
     """How much a leaf covers at time t: corner (x, y) of a box and its alpha (h, w); None: unseen.
 
-    The ellipse's edge is blurred with the lens: alpha = Phi(distance / psf), a first-order distance.
+    The ellipse's edge is blurred with the lens: alpha = Phi(distance / psf), with the distance
+    to first order.
     """
     from scipy.special import ndtr
 
     centre = leaf.centre_mm + leaf.motion(t_s)[0, :3]
-    spots = project(np.vstack([centre, centre + [1.0, 0, 0]]))
+    spots = project(np.vstack([centre, centre + np.array([1.0, 0, 0])]))
     if not np.isfinite(spots).all():
         return None
     scale = float(np.linalg.norm(spots[1] - spots[0]))
@@ -166,9 +168,8 @@ def dapple_canopy(dapple: Dapple, size_px: tuple[int, int], seed: int) -> Image:
     rng = np.random.default_rng([seed, 12])
     step = max(dapple.patch_px / 4, 1.0)
     coarse = rng.standard_normal((int(height / step) + 2, int(width / step) + 2)).astype(np.float32)
-    coarse = cv2.GaussianBlur(coarse, (0, 0), 1.2)
-    coarse /= coarse.std()
-    fine = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
+    smoothed = np.asarray(cv2.GaussianBlur(coarse, (0, 0), 1.2), dtype=np.float32)
+    fine = cv2.resize(smoothed / smoothed.std(), (width, height), interpolation=cv2.INTER_CUBIC)
     slope = 1.4 / dapple.patch_px  # typical change of the field per px
     lit = 1 / (1 + np.exp(-(fine - 0.1) / (slope * dapple.edge_px / 2)))
     light: Image = (dapple.light_in_shadow + (1 - dapple.light_in_shadow) * lit).astype(np.float32)

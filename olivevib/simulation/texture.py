@@ -1,6 +1,6 @@
 """A print as an image that can be sampled anywhere: area-averaged, blurred just enough.
 
-The texel is chosen for the view at hand: about a fifth of a pixel, across the edges, so that what
+The texel is chosen for the view at hand: about a sixth of a pixel, across the edges, so that what
 the texture blurs is a small, known part of the lens's blur (``Texture.variance_mm2``).
 """
 
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from olivevib.arrays import Floats
 from olivevib.simulation.planar import Planar
 
-TEXEL_PX = 0.2  # largest texel, in px across an edge
-MOST_VARIANCE_PX2 = 0.04  # that a texture may blur, in its worst direction
+TEXEL_PX = 0.16  # largest texel, in px across an edge
+MOST_VARIANCE_PX2 = 0.045  # that a texture may blur, in its worst direction
 STEPS_PER_OCTAVE = 4  # of texel sizes, so that few textures serve many views
-BLUR_TEXELS = 0.8
-RIM = 4  # empty texels around the card
+BLUR_TEXELS = 1.2
+RIM = 6  # empty texels around the card
 KEPT = 12  # textures of one print that stay in memory
 
 # Variance in texels²: area average, Gaussian, and the mean effect of linear interpolation.
@@ -60,7 +60,7 @@ class Textures:
         texel = TEXEL_PX * np.linalg.norm(np.linalg.inv(px_per_mm), axis=1)
         blur = px_per_mm * texel  # px (2) by texel (2)
         worst = VARIANCE_TEXELS2 * np.linalg.norm(blur, ord=2) ** 2
-        texel = texel * np.sqrt(min(1.0, MOST_VARIANCE_PX2 / worst))
+        texel = texel * float(np.sqrt(min(1.0, MOST_VARIANCE_PX2 / float(worst))))
         steps = np.floor(np.log2(texel) * STEPS_PER_OCTAVE)
         key = (int(steps[0]), int(steps[1]))
         if key not in self._drawn:
@@ -79,8 +79,11 @@ def draw(planar: Planar, texel_mm: Floats) -> Texture:
     dark = _cover(planar.dark_mm, across[0], across[1])
     card = _cover(planar.card_mm[None], across[0], across[1])
     white = dark if planar.inverted else card - dark
-    blurred = [cv2.GaussianBlur(a, (0, 0), BLUR_TEXELS) for a in (white, card)]
-    return Texture(blurred[0], blurred[1], edge + texel_mm / 2, texel_mm)
+    return Texture(_blurred(white), _blurred(card), edge + texel_mm / 2, texel_mm)
+
+
+def _blurred(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), BLUR_TEXELS), dtype=np.float32)
 
 
 def _cover(boxes_mm: Floats, x_mm: Floats, y_mm: Floats) -> NDArray[np.float32]:

@@ -41,6 +41,14 @@ def frames_of(stage: Stage, side: str) -> Frames:
     return Frames(camera.clock.exposed_s(count), stamps, camera.clock.delivered(count, rng))
 
 
+def board_frames(stage: Stage, side: str) -> Frames:
+    """When one camera saw the board: a video from t = 0, or stills of a board that is held."""
+    plan, clock = stage.scenario.board, getattr(stage.tree, side).clock
+    every = np.ones(plan.views, dtype=np.bool_)
+    times = np.arange(plan.views) / (plan.video_fps or 1.0)
+    return Frames(times + clock.offset_s, np.rint(times * 1e6).astype(np.int64), every)
+
+
 @dataclass(frozen=True)
 class View:
     """What one camera should find of every marker in every frame (N), (M) markers.
