@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import pyuff
 
 from olivevib.errors import InputError
 from olivevib.files.accelerometer import AccelerometerRecord, read_accelerometer
@@ -126,9 +127,12 @@ def test_universal_files_with_accelerations(shared_data: Path) -> None:
     binary = read(shared_data, "uff58/binary8byte.uff")
     assert (binary.samples.values.shape, binary.source_unit) == ((250, 1), "g")
     assert binary.rate_hz == pytest.approx(100)
+    path = shared_data / "accelerometer" / "uff58" / "binary8byte.uff"
+    theirs = pyuff.UFF(str(path)).read_sets(0)
     np.testing.assert_allclose(
-        binary.samples.values[:, 0] / 9.80665, np.sin(2 * np.pi * 5 * binary.samples.t_s), atol=2e-6
+        binary.samples.values[:, 0] / 9.80665, theirs["data"], rtol=0, atol=1e-15
     )
+    np.testing.assert_allclose(binary.samples.t_s, theirs["x"], rtol=0, atol=1e-12)
     text = read(shared_data, "uff58/time-history-not-all-columns-filled.uff")
     assert (text.samples.values.shape, text.source_unit) == ((13, 1), "m/s2")
     assert text.rate_hz == pytest.approx(20000)

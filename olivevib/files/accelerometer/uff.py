@@ -135,7 +135,7 @@ def _read_set(block: bytes, body_at: int, length_unit: str, source: str, *, bina
     title = _label(head[1])
     name, unit = _described(head[9], title, direction, length_unit)
     if (node := _int(head[6][41:51])) > 0:
-        name = f"{name} node {node}"
+        name = f"node {node} {name}"
     found = _Set(
         name=name,
         unit=unit,

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import difflib
-import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
-from olivevib.errors import InputError, UsageError
+from olivevib.errors import UsageError
+from olivevib.files.atomic import as_input_error, replacing
 from olivevib.files.exports.csv_rows import write_csv
 from olivevib.files.exports.facts import ExportFacts, only_markers
 from olivevib.files.exports.txt_columns import write_txt
@@ -64,19 +63,7 @@ def _write_whole(path: Path, write: Callable[[BinaryIO], None]) -> None:
     """Write beside ``path``, sync, rename: a reader sees the old file or the new one."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, beside = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        try:
-            with os.fdopen(handle, "wb") as out:
-                write(out)
-                out.flush()
-                os.fsync(out.fileno())
-            Path(beside).chmod(0o644)
-            Path(beside).replace(path)
-        finally:
-            Path(beside).unlink(missing_ok=True)
     except OSError as error:
-        raise InputError(
-            f"{path} could not be written.",
-            str(error.strerror or error),
-            "Choose another place with -o, or make room on the disk.",
-        ) from error
+        raise as_input_error(error, path) from error
+    with replacing(path) as beside, beside.open("wb") as out:
+        write(out)
