@@ -101,7 +101,7 @@ def sampling_facts(trial: Trial, clock: TrialClock) -> SamplingFacts:
         frame_rate_hz=left.rate_hz,
         row_time_known=known,
         right_offset_known=clock.source != "unknown",
-        stamps_true=False,
+        stamps_true="slots" not in (left.stamp_kind, right.stamp_kind),
         band_hz=band or SamplingFacts(left.rate_hz).band_hz,
         band_declared=band is not None,
         row_time_s=left.row_time_s if known else None,

@@ -78,6 +78,8 @@ def _recorded(trial: Trial, side: str, info: VideoInfo, seen: list[FrameObservat
     file = trial.path(camera.stamps) if camera.stamps else None
     container = [s.stamp_s for s in seen]
     stamps, kind, fit = stamps_of(file, trial.path(camera.video), container)
+    if kind == "container" and info.container.startswith("avi"):
+        kind = "slots"  # AVI has no stamps of its own: the frame's number times the rate
     return _Recorded(side, info, seen, stamps, kind, fit)
 
 
