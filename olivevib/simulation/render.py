@@ -33,14 +33,17 @@ Box = tuple[int, int, int, int]  # x0, y0, x1, y1 in px, ends excluded
 
 
 class Renderer:
-    """Draws the frames of one camera; a frame depends on scene, frame number and time alone."""
+    """Draws the frames of one camera; a frame depends on scene, frame number and time alone.
 
-    def __init__(self, scene: Scene, side: str) -> None:
+    ``rays`` may be those of another renderer of the same camera: they take a second to tabulate.
+    """
+
+    def __init__(self, scene: Scene, side: str, rays: Floats | None = None) -> None:
         self._scene = scene
         self._camera: Camera = scene.left if side == "left" else scene.right
         self._salt = 1 if side == "left" else 2
         self._textures: dict[int, Textures] = {}
-        self._rays = _ray_table(self._camera)
+        self.rays = _ray_table(self._camera) if rays is None else rays
         size, around = self._camera.model.size_px, scene.surroundings
         self._backdrop = backdrop(around, size, self._camera.project, scene.seed)
         self._gradient = gradient_light(around, size)
@@ -142,7 +145,7 @@ class Renderer:
     ) -> None:
         """Add white and card of the print at one instant (per row) to the fine grid."""
         x0, y0, x1, y1 = (v + BORDER_PX for v in box)
-        X, Y = self._rays[0][y0:y1, x0:x1], self._rays[1][y0:y1, x0:x1]
+        X, Y = self.rays[:, y0:y1, x0:x1]
         row_time = self._camera.model.row_time_s
         rows = np.arange(box[1], box[3], dtype=np.float64) if row_time else np.zeros(1)
         times: Floats = t_s + row_time * rows

@@ -83,8 +83,7 @@ def _coded(board: Board) -> bool:
 
 def cameras(scenario: Scenario, rng: np.random.Generator) -> tuple[Camera, Camera]:
     """Two webcams that look at the same spot, with their own small faults of lens and mounting."""
-    plan, distance = scenario.cameras, scenario.markers.distance_mm
-    inward = np.arctan2(plan.baseline_mm / 2, distance)
+    plan, inward = scenario.cameras, _inward(scenario)
     tweak = rng.normal(0, 0.006, 3)
     R = rotation_from_vector(tweak) @ rotation_from_vector([0.0, 2 * inward, 0.0])
     centre = rotation_from_vector([0.0, -inward, 0.0]) @ np.array([plan.baseline_mm, 0.0, 0.0])
@@ -114,7 +113,8 @@ def _markers(scenario: Scenario, seed: int, codes: MarkerLibrary | None) -> tupl
     out = []
     for k, number in enumerate(plan.ids):
         size = round(float(rng.uniform(*plan.size_mm)), 1)
-        R0 = _facing(rng.uniform(*plan.tilt_deg), rng.uniform(0, 360), rng.normal(0, 12))
+        leant = _facing(rng.uniform(*plan.tilt_deg), rng.uniform(0, 360), rng.normal(0, 12))
+        R0 = _towards_both(scenario) @ leant
         place = "trunk" if abs(spots[k, 0]) < 200 else "branch"
         moves = _motion(scenario, k, place, wanders)
         planar = marker_planar(plan.library, number, size, codes)
@@ -135,6 +135,23 @@ def _spots(count: int, distance_mm: float, rng: np.random.Generator) -> Floats:
     spots = np.column_stack([x, y, np.full(count, distance_mm)])
     out: Floats = spots + rng.uniform([-30, -25, -60], [30, 25, 60], (count, 3))
     return out
+
+
+def _inward(scenario: Scenario) -> float:
+    """How far each camera is turned in, rad."""
+    half = scenario.cameras.baseline_mm / 2
+    return float(np.arctan2(half, scenario.markers.distance_mm))
+
+
+def _towards_both(scenario: Scenario) -> Floats:
+    """The rotation of a print that faces the middle between the cameras."""
+    out: Floats = rotation_from_vector([0.0, -_inward(scenario), 0.0])
+    return out
+
+
+def _common_x(scenario: Scenario, z_mm: float) -> float:
+    """The x at distance z in the middle of what both cameras see."""
+    return scenario.cameras.baseline_mm / 2 * (1 - z_mm / scenario.markers.distance_mm)
 
 
 def _facing(tilt_deg: float, azimuth_deg: float, roll_deg: float) -> Floats:
@@ -255,11 +272,10 @@ def _middle(planar: Planar) -> Floats:
 
 
 def _held(scenario: Scenario, planar: Planar, rng: np.random.Generator) -> Body:
-    R0 = _facing(rng.uniform(8, 38), rng.uniform(0, 360), rng.normal(0, 12))
+    leant = _facing(rng.uniform(8, 38), rng.uniform(0, 360), rng.normal(0, 12))
+    R0 = _towards_both(scenario) @ leant
     z = rng.uniform(*scenario.board.distance_mm)
-    x = rng.uniform(-0.42, 0.42) * z - 0.5 * scenario.cameras.baseline_mm * (
-        z / scenario.markers.distance_mm - 1
-    )
+    x = _common_x(scenario, z) + rng.uniform(-0.42, 0.42) * z
     centre = np.array([x, rng.uniform(-0.27, 0.27) * z, z])
     return Body(planar, R0, centre - R0 @ _middle(planar))
 
@@ -274,12 +290,14 @@ def _whole(camera: Camera, body: Body) -> bool:
 def _waved(scenario: Scenario, planar: Planar, rng: np.random.Generator) -> Body:
     """A board waved slowly through the common field, turning about all three axes."""
     near, far = scenario.board.distance_mm
-    middle = np.array([0.0, 0.0, (near + far) / 2])
-    reach = np.array([0.17 * near, 0.07 * near, (far - near) / 2])
+    z = (near + far) / 2
+    middle = np.array([_common_x(scenario, z), 0.0, z])
+    reach = np.array([0.24 * near, 0.10 * near, (far - near) / 2])
     phases = rng.uniform(0, 2 * np.pi, (3, 6))
     terms = (
         Sway(0.29, np.array([reach[0], 0, 0, 0.42, 0, 0]), phases[0]),
         Sway(0.43, np.array([0, reach[1], 0, 0, 0.45, 0]), phases[1]),
         Sway(0.17, np.array([0, 0, reach[2], 0, 0, 0.3]), phases[2]),
     )
-    return Body(planar.moved(-_middle(planar)[:2]), np.eye(3), middle, Motion(terms))
+    centred = planar.moved(-_middle(planar)[:2])
+    return Body(centred, _towards_both(scenario), middle, Motion(terms))

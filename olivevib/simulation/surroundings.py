@@ -163,6 +163,8 @@ def gradient_light(around: Surroundings, size_px: tuple[int, int]) -> Image | No
 
 def dapple_canopy(dapple: Dapple, size_px: tuple[int, int], seed: int) -> Image:
     """The pattern of light under the crown, larger than the picture by the reach on each side."""
+    from scipy.special import expit
+
     pad = int(np.ceil(dapple.reach_px)) + 2
     width, height = size_px[0] + 2 * pad, size_px[1] + 2 * pad
     rng = np.random.default_rng([seed, 12])
@@ -171,7 +173,7 @@ def dapple_canopy(dapple: Dapple, size_px: tuple[int, int], seed: int) -> Image:
     smoothed = np.asarray(cv2.GaussianBlur(coarse, (0, 0), 1.2), dtype=np.float32)
     fine = cv2.resize(smoothed / smoothed.std(), (width, height), interpolation=cv2.INTER_CUBIC)
     slope = 1.4 / dapple.patch_px  # typical change of the field per px
-    lit = 1 / (1 + np.exp(-(fine - 0.1) / (slope * dapple.edge_px / 2)))
+    lit = expit((fine - 0.1) / (slope * dapple.edge_px / 2))
     light: Image = (dapple.light_in_shadow + (1 - dapple.light_in_shadow) * lit).astype(np.float32)
     return light
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from olivevib.arrays import Grey
+from olivevib.arrays import Floats, Grey
 from olivevib.marker import MarkerLibrary
 from olivevib.progress import Tick, silent
 from olivevib.simulation.accelerometer import record
@@ -87,11 +87,14 @@ class _Crew:
         self._tick = tick
         self._total = total
         self._done = 0
+        self._rays: dict[str, Floats] = {}
 
     def renderers(self, scene: Scene) -> dict[str, Renderer]:
-        """A renderer for each camera."""
-        made = self._pool.map(lambda side: Renderer(scene, side), SIDES)
-        return dict(zip(SIDES, made, strict=True))
+        """A renderer for each camera; every scene of a stage has the same two cameras."""
+        made = self._pool.map(lambda side: Renderer(scene, side, self._rays.get(side)), SIDES)
+        out = dict(zip(SIDES, made, strict=True))
+        self._rays = {side: out[side].rays for side in SIDES}
+        return out
 
     def pair(self, work: Callable[[str], bytes | None], note: str) -> list[bytes | None]:
         """``work`` for left and right; counts one pair."""
