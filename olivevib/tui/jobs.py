@@ -1,0 +1,127 @@
+"""The long jobs of the app, each a verb of the pipeline: what the command line does too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from olivevib.errors import Caution
+from olivevib.progress import Tick
+from olivevib.tui.harmless import harmless
+from olivevib.tui.work import Result, Work
+
+if TYPE_CHECKING:
+    from olivevib.pipeline import NewTrial
+
+
+def run_all(folder: Path) -> Work:
+    """Every stage that is missing or stale, in order."""
+
+    def do(tick: Tick) -> Result:
+        from olivevib import pipeline
+        from olivevib.trial import Trial
+
+        outcomes = list(pipeline.run(Trial.open(folder), tick))
+        done = [o.stage for o in outcomes if o.words == "done"]
+        cautions = tuple(c for o in outcomes for c in o.cautions)
+        return Result(_ran(done, cautions), cautions)
+
+    return Work(f"{_name(folder)}: run", do)
+
+
+def run_one(folder: Path, stage: str) -> Work:
+    """One stage, whether or not it is up to date."""
+
+    def do(tick: Tick) -> Result:
+        from olivevib import pipeline
+        from olivevib.trial import Trial
+
+        cautions = pipeline.run_stage(Trial.open(folder), stage, tick)
+        return Result(_ran([stage], cautions), cautions)
+
+    return Work(f"{_name(folder)}: {stage}", do)
+
+
+def _ran(done: Sequence[str], cautions: Sequence[Caution]) -> str:
+    if not done:
+        return "Nothing to do: every stage that can run is up to date. v shows the results."
+    warned = f"; {len(cautions)} warning{'s' * (len(cautions) != 1)} to read" if cautions else ""
+    return f"{', '.join(done)} done{warned}. v shows the results, e makes the report."
+
+
+def make_report(folder: Path) -> Work:
+    """One self-contained page beside the trial."""
+
+    def do(tick: Tick) -> Result:
+        from olivevib import pipeline
+        from olivevib.trial import Trial
+
+        page = next(iter(pipeline.report([Trial.open(folder)], None, tick)))
+        return Result(f"The report is {harmless(page)}", path=page)
+
+    return Work(f"{_name(folder)}: report", do)
+
+
+def make_export(folder: Path, to: str) -> Work:
+    """The 3-D paths for another program, into ``exports/``."""
+
+    def do(tick: Tick) -> Result:
+        from olivevib import pipeline
+        from olivevib.trial import Trial
+
+        trial = Trial.open(folder)
+        target = pipeline.export_place(trial, to)
+        tick(0, 1, f"writing {to}")
+        pipeline.export(trial, to, target)
+        return Result(f"The export is {harmless(target)}", path=target)
+
+    return Work(f"{_name(folder)}: export {to}", do)
+
+
+def make_trial(folder: Path, plan: NewTrial) -> Work:
+    """A new trial from recordings; nothing is overwritten."""
+
+    def do(tick: Tick) -> Result:
+        from olivevib import pipeline
+
+        trial = pipeline.new_trial(folder, plan, tick)
+        words = f"{harmless(trial.name)} is made. r runs every stage, s describes it."
+        return Result(words, path=trial.folder)
+
+    return Work(f"{_name(folder)}: copying recordings", do)
+
+
+def make_demo(workspace: Path) -> Work:
+    """A simulated trial with known truth, to try everything on."""
+
+    def do(tick: Tick) -> Result:
+        from olivevib.pipeline.simulated import simulated_trial
+        from olivevib.trial.workspace import make_workspace
+
+        make_workspace(workspace)
+        trial = simulated_trial(workspace / "trials" / DEMO, DEMO, 1, tick)
+        return Result("The simulated trial is made. Enter opens it, r runs it.", path=trial.folder)
+
+    return Work("simulating a trial", do)
+
+
+DEMO = "demo"
+
+
+def check_trial(folder: Path) -> Work:
+    """Read everything in the trial from end to end; nothing is changed."""
+
+    def do(tick: Tick) -> Result:
+        from olivevib import pipeline
+
+        findings = pipeline.check(folder, tick)
+        bad = [f for f in findings if f.state != "whole"]
+        told = "; ".join(f"{f.what} {f.state}: {f.words}" for f in bad)
+        return Result(f"{len(findings)} things checked, {told or 'all whole'}.")
+
+    return Work(f"{_name(folder)}: check", do)
+
+
+def _name(folder: Path) -> str:
+    return harmless(folder.resolve().name, 40)

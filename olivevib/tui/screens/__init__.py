@@ -1,0 +1,27 @@
+"""One screen a file; each is imported when it is first opened."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from olivevib.tui.screens.page import Page
+
+PAGES = {
+    "trial": "trial:TrialPage",
+    "results": "results:ResultsPage",
+    "motion": "motion:MotionPage",
+    "compare": "compare:ComparePage",
+    "pictures": "pictures:PicturesPage",
+    "report": "report:ReportPage",
+    "settings": "settings:SettingsPage",
+}
+
+
+def make_page(name: str, folder: Path) -> Page:
+    """The page ``name`` of the trial in ``folder``."""
+    module, kind = PAGES[name].split(":")
+    page: Page = getattr(import_module(f"olivevib.tui.screens.{module}"), kind)(folder)
+    return page

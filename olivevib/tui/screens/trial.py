@@ -1,0 +1,138 @@
+"""One trial: its stages with state and reason, run and cancel, warnings with remedies."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.coordinate import Coordinate
+from textual.containers import Horizontal, VerticalScroll
+from textual.widgets import DataTable, Static
+
+from olivevib.tui import jobs
+from olivevib.tui.harmless import plain
+from olivevib.tui.loader import STAGE_NAMES, TrialFacts, trial_facts
+from olivevib.tui.screens.page import Help, Jump, Page
+from olivevib.tui.widgets.title import Title
+
+FOUND_ON = {
+    "calibrate": "",  # told beside the stages
+    "track": "pictures",
+    "reconstruct": "results",
+    "analyse": "results",
+    "compare": "compare",
+}
+
+
+class TrialPage(Page):
+    """The trial's own screen: from here everything of it is reached."""
+
+    NAME = "trial"
+    HELP_TEXT = Help(
+        "The five stages of the measurement. Each writes one file; its state is computed from the "
+        "files: done, stale (an input or setting changed since), missing, failed, blocked by an "
+        "earlier stage, skipped for want of an input. Running never changes a recording, and "
+        "cancelling keeps what is finished: the next run goes on from there.",
+        "A webcam calibrated well fits to 0.1–0.3 px and measures distances on unused views to "
+        "0.5 mm or 0.3 %. Markers should be seen in 95 % of the frames. Each warning says what "
+        "to do.",
+    )
+    JUMPS = (Jump("s", "#stages"), Jump("w", "#warnings"), Jump("f", "#facts"))
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("enter", "open", "Show what the stage found", show=False),
+        Binding("r", "run", "Run all"),
+        Binding("t", "run_one", "Run one"),
+        Binding("v", "page('results')", "Results"),
+        Binding("e", "page('report')", "Report"),
+        Binding("s", "page('settings')", "Settings"),
+        Binding("m", "page('motion')", "Motion over time", show=False),
+        Binding("c", "page('compare')", "Compare with accelerometer", show=False),
+        Binding("k", "page('pictures')", "Pictures with markers", show=False),
+        Binding("x", "check", "Check every file", show=False),
+    ]
+
+    def body(self) -> ComposeResult:
+        """Stages above, warnings and facts below."""
+        yield DataTable(id="stages", classes="pane", cursor_type="row")
+        with Horizontal(id="below"):
+            with VerticalScroll(id="warnings", classes="pane"):
+                yield Static("reading …", id="warning-text", markup=False)
+            with VerticalScroll(id="facts", classes="pane"):
+                yield Static("", id="fact-text", markup=False)
+
+    def on_mount(self) -> None:
+        """Name the panes."""
+        super().on_mount()
+        for name, title in (("stages", "Stages"), ("warnings", "Warnings"), ("facts", "Known")):
+            self.query_one(f"#{name}").border_title = title
+        table = self.query_one("#stages", DataTable)
+        table.add_columns("stage", "state", "reason")
+        for name in STAGE_NAMES:
+            table.add_row(name, "…", "")
+        table.focus()
+
+    def read(self) -> TrialFacts:
+        """Summary and settings from the files."""
+        return trial_facts(self.folder)
+
+    def show(self, value: object) -> None:
+        """States, warnings, facts."""
+        if not isinstance(value, TrialFacts):
+            return
+        from olivevib.tui.views.tables import facts_text, warnings_text
+
+        self._facts = value
+        palette, summary = self.olive.palette, value.summary
+        simulated = ("simulated",) if summary["simulated"] else ()
+        self.query_one(Title).say(summary["trial"], *simulated)
+        self._show_stages(value)
+        self.query_one("#warning-text", Static).update(warnings_text(summary["warnings"], palette))
+        self.query_one("#fact-text", Static).update(facts_text(summary, palette))
+        count = len(summary["warnings"])
+        self.query_one("#warnings").border_title = f"Warnings ({count})" if count else "Warnings"
+
+    def _show_stages(self, facts: TrialFacts) -> None:
+        from olivevib.tui.views.tables import state_cell
+
+        table = self.query_one("#stages", DataTable)
+        for at, stage in enumerate(facts.stages):
+            reason = stage.reason
+            if stage.name == "track" and facts.resume and stage.state != "done":
+                reason = f"{reason}; {facts.resume}"
+            state = state_cell(stage.state, self.olive.palette)
+            table.update_cell_at(Coordinate(at, 1), state, update_width=True)
+            table.update_cell_at(Coordinate(at, 2), plain(reason, 160), update_width=True)
+
+    def recolour(self) -> None:
+        """Draw again in the new theme."""
+        self.show(getattr(self, "_facts", None))
+
+    # -- keys -----------------------------------------------------------------------------------
+
+    def action_run(self) -> None:
+        """Run every stage that is missing or stale."""
+        self.olive.start(jobs.run_all(self.folder))
+
+    @on(DataTable.RowSelected, "#stages")
+    def _show_stage(self) -> None:
+        """Show what the marked stage found."""
+        page = FOUND_ON[STAGE_NAMES[self.query_one("#stages", DataTable).cursor_row]]
+        if page:
+            self.action_page(page)
+        else:
+            self.query_one("#facts").focus()
+
+    def action_run_one(self) -> None:
+        """Run the marked stage, whatever its state."""
+        stage = STAGE_NAMES[self.query_one("#stages", DataTable).cursor_row]
+        self.olive.start(jobs.run_one(self.folder, stage))
+
+    def action_check(self) -> None:
+        """Read every file from end to end."""
+        self.olive.start(jobs.check_trial(self.folder))
+
+    def action_page(self, name: str) -> None:
+        """Show another page of this trial."""
+        self.olive.show_page(name, self.folder)

@@ -1,0 +1,63 @@
+"""Numbers and states as a technician reads them: a frequency never without its status."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+GLYPHS = {
+    "done": "●",
+    "stale": "◐",
+    "missing": "○",
+    "failed": "✗",
+    "blocked": "□",
+    "skipped": "–",
+}
+DECIDED = ("direct", "confirmed", "supported")
+CANDIDATES_SHOWN = 5
+
+
+def number(value: float | None, digits: int, unit: str = "") -> str:
+    """The number with its unit, or "not known"."""
+    if value is None or not math.isfinite(value):
+        return "not known"
+    return f"{value:.{digits}f}{' ' * bool(unit)}{unit}"
+
+
+def short(value: float | None, digits: int) -> str:
+    """The number for a table, – where it is not known."""
+    return "–" if value is None or not math.isfinite(value) else f"{value:.{digits}f}"
+
+
+def frequency(
+    f_hz: float | None, sigma_hz: float | None, status: str | None, candidates_hz: Sequence[float]
+) -> str:
+    """The frequency with its status; the candidates where it is not decided."""
+    if status is None:
+        return "not analysed"
+    if status in DECIDED and f_hz is not None and math.isfinite(f_hz):
+        known = sigma_hz is not None and math.isfinite(sigma_hz)
+        return f"{f_hz:.4f}{f' ± {sigma_hz:.4f}' if known else ''} Hz, {status}"
+    if not candidates_hz:
+        return status
+    shown = ", ".join(f"{f:.2f}" for f in candidates_hz[:CANDIDATES_SHOWN])
+    more = ", …" if len(candidates_hz) > CANDIDATES_SHOWN else ""
+    return f"{status}: {shown}{more} Hz"
+
+
+def marker_frequency(marker: Mapping[str, Any]) -> str:
+    """The frequency of a marker of the summary."""
+    return frequency(
+        marker["frequency_hz"],
+        marker["frequency_sigma_hz"],
+        marker["frequency_status"],
+        marker["frequency_candidates_hz"],
+    )
+
+
+def seconds_left(left_s: float) -> str:
+    """Time left as a person says it."""
+    if left_s < 90:
+        return f"{left_s:.0f} s left"
+    return f"{left_s / 60:.0f} min left" if left_s < 5400 else f"{left_s / 3600:.1f} h left"

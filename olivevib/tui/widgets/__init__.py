@@ -1,0 +1,1 @@
+"""Widgets that show frozen values; none of them reads a file."""
