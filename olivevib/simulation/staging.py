@@ -292,7 +292,7 @@ def _waved(scenario: Scenario, planar: Planar, rng: np.random.Generator) -> Body
     near, far = scenario.board.distance_mm
     z = (near + far) / 2
     middle = np.array([_common_x(scenario, z), 0.0, z])
-    reach = np.array([0.24 * near, 0.10 * near, (far - near) / 2])
+    reach = np.array([0.30 * near, 0.10 * near, (far - near) / 2])
     phases = rng.uniform(0, 2 * np.pi, (3, 6))
     terms = (
         Sway(0.29, np.array([reach[0], 0, 0, 0.42, 0, 0]), phases[0]),
