@@ -180,7 +180,7 @@ def _play(packets: Packets, stream: VideoStream) -> Iterator[Placed[VideoFrame]]
     known = packets.stamped or codec.codec.intra_only
     order: FrameOrder[VideoFrame] = FrameOrder(known_order=known)
     for packet, slip in packets:
-        packet.opaque = slip.index
+        packet.opaque = _Origin(slip.index)
         order.sent(slip)
         try:
             pictures = codec.decode(packet)
@@ -198,9 +198,20 @@ def _play(packets: Packets, stream: VideoStream) -> Iterator[Placed[VideoFrame]]
     yield from order.ended()
 
 
+@dataclass(frozen=True)
+class _Origin:
+    """The count of a packet, as an object of its own.
+
+    PyAV keeps what rides on a packet under its address, for the whole process: an int shared by
+    two videos that are read at the same time would be taken from one when the other is done.
+    """
+
+    index: int
+
+
 def _origin(picture: VideoFrame) -> int:
     """The count of the packet that a picture was decoded from; -1 where it does not say."""
-    return picture.opaque if isinstance(picture.opaque, int) else -1
+    return picture.opaque.index if isinstance(picture.opaque, _Origin) else -1
 
 
 def _first_picture(path: Path, container: InputContainer, stream: VideoStream) -> VideoFrame:
