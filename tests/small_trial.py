@@ -30,7 +30,8 @@ def position_mm(marker: int, t_s: float) -> np.ndarray:
     """Where the middle of a marker is, in the left camera's frame."""
     rest = {3: (-60.0, -40.0, 1000.0), 11: (70.0, 45.0, 1040.0)}[marker]
     phase = 2 * np.pi * F_HZ * t_s + marker
-    return np.array(rest) + [4.0 * np.cos(phase), 2.0 * np.sin(phase), 1.5 * np.cos(phase)]
+    orbit = np.array([4.0 * np.cos(phase), 2.0 * np.sin(phase), 1.5 * np.cos(phase)])
+    return np.array(rest) + orbit
 
 
 def picture(side: str, t_s: float, seed: int) -> np.ndarray:
@@ -41,12 +42,8 @@ def picture(side: str, t_s: float, seed: int) -> np.ndarray:
     flat = np.array([[-h, -h, 0], [h, -h, 0], [h, h, 0], [-h, h, 0.0]])
     for marker in IDS:
         points = position_mm(marker, t_s) + flat
-        pair = rig()
-        px = (
-            pair.left.project(points)
-            if side == "left"
-            else pair.right.project(pair.to_right(points))
-        )
+        seen = points if side == "left" else rig().to_right(points)
+        px = getattr(rig(), side).project(seen)
         x0, y0 = (px.mean(axis=0) - 40).astype(int)
         image[y0 : y0 + 80, x0 : x0 + 80] = draw_square(
             aruco_pattern(marker), px - [x0, y0], (80, 80), rng, noise=1.5
