@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from olivevib.cli import values
+from olivevib import values
 from olivevib.cli.console import Console
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from olivevib.cli import values
+from olivevib import values
 from olivevib.cli.console import Console
 
 

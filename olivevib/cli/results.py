@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from olivevib.cli import values
+from olivevib import values
 from olivevib.cli.console import Console
 
 

@@ -1,4 +1,4 @@
-"""Words of the command line to values: id lists, bands, settings."""
+"""What a person types, as values: id lists, bands, row times, settings."""
 
 from __future__ import annotations
 
