@@ -76,7 +76,7 @@ def test_centres_reach_the_bound_and_their_ellipses_hold(size, tilt, limit):
             claimed.append(np.trace(C) / 2)
             normalised.append(e @ np.linalg.solve(C, e))
             assert np.sqrt(fit.variance_px2 - PIXEL_VARIANCE) == pytest.approx(0.7, abs=0.03)
-    assert np.sqrt(np.mean(claimed)) == pytest.approx(limit, rel=0.06)
+    assert np.sqrt(np.mean(claimed)) == pytest.approx(limit, rel=0.12)
     assert np.sqrt((np.array(errors) ** 2).mean()) < 1.10 * limit * (1 + 2 / np.sqrt(4 * 60))
     assert 0.88 <= (np.array(normalised) < 5.99).mean() <= 0.99
 

@@ -71,24 +71,38 @@ class Bars:
         )
 
 
-def dark_domains(dark: Grey) -> Domains:
-    """Domains of the non-zero pixels of ``dark`` (H, W) uint8."""
+def dark_domains(dark: Grey, area_px2: tuple[float, float] = (0, np.inf)) -> Domains:
+    """Domains of the non-zero pixels of ``dark`` (H, W) uint8.
+
+    Only those with an area within ``area_px2`` are measured; of others neither area nor runs stay.
+    """
     count, labels = cv2.connectedComponents(dark, connectivity=8, ltype=cv2.CV_32S)
     runs = _runs(dark, np.asarray(labels, dtype=np.int32))
+    pixels = np.bincount(runs.domain, runs.last - runs.first + 1, minlength=count)
+    area = pixels.astype(np.float64)
+    wanted = (area >= area_px2[0]) & (area <= area_px2[1])
+    if not wanted.all():
+        area = np.where(wanted, area, 0.0)
+        keep = np.flatnonzero(wanted[runs.domain])
+        runs = Runs(runs.y[keep], runs.first[keep], runs.last[keep], runs.domain[keep])
+    return _measured(runs, area)
+
+
+def _measured(runs: Runs, area: Floats) -> Domains:
     m = (runs.last - runs.first + 1).astype(np.float64)
     x = 0.5 * (runs.first + runs.last)
     y = runs.y.astype(np.float64)
-
-    def total(values: Floats) -> Floats:
-        return np.bincount(runs.domain, values, minlength=count).astype(np.float64)
-
-    area = total(m)
     safe = np.maximum(area, 1.0)
-    cx, cy = total(m * x) / safe, total(m * y) / safe
+
+    def mean(values: Floats) -> Floats:
+        total = np.bincount(runs.domain, values, minlength=area.size)
+        return np.asarray(total / safe, dtype=np.float64)
+
+    cx, cy = mean(m * x), mean(m * y)
     dx, dy = x - cx[runs.domain], y - cy[runs.domain]
-    xx = total(m * (dx * dx + (m * m - 1) / 12)) / safe + 1 / 12
-    yy = total(m * dy * dy) / safe + 1 / 12
-    xy = total(m * dx * dy) / safe
+    xx = mean(m * (dx * dx + (m * m - 1) / 12)) + 1 / 12
+    yy = mean(m * dy * dy) + 1 / 12
+    xy = mean(m * dx * dy)
     return Domains(area, np.column_stack([cx, cy]), np.column_stack([xx, yy, xy]), runs)
 
 
@@ -99,9 +113,10 @@ def _runs(dark: Grey, labels: NDArray[np.int32]) -> Runs:
     np.not_equal(dark, 0, out=rows[:, :width])
     turns = np.flatnonzero(padded[1:] != padded[:-1])
     start, end = turns[0::2], turns[1::2]
-    y, first = np.divmod(start, width + 1)
+    y = start // (width + 1)
+    first = start - y * (width + 1)
     last = first + (end - start) - 1
-    return Runs(y, first, last, labels[y, first])
+    return Runs(y, first, last, labels.ravel()[start - y])
 
 
 def principal_axes(moments: Floats) -> tuple[Floats, Floats, Floats]:

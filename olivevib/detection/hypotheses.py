@@ -7,6 +7,7 @@ hypothesis costs a reading of its code; none is refused for want of a third bar.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,11 +81,11 @@ def _neighbours(bars: Bars) -> tuple[Ints, Ints]:
     tree = cKDTree(bars.centre)
     near = tree.query_ball_point(bars.centre, 1.8 * bars.length, return_sorted=False)
     i = np.repeat(np.arange(len(bars)), [len(n) for n in near])
-    j = np.concatenate([np.asarray(n, dtype=np.int64) for n in near])
-    keep = i != j
-    low, high = np.minimum(i, j)[keep], np.maximum(i, j)[keep]
-    key = np.unique(low * len(bars) + high)
-    return key // len(bars), key % len(bars)
+    j = np.fromiter(itertools.chain.from_iterable(near), np.int64, i.size)
+    L = bars.length
+    longer = (L[i] > L[j]) | ((L[i] == L[j]) & (i < j))  # each pair once, from its longer bar
+    i, j = i[longer], j[longer]
+    return np.minimum(i, j), np.maximum(i, j)
 
 
 def _opposite(bars: Bars, i: Ints, j: Ints, layout: MarkerLayout) -> Frames:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +61,7 @@ def _pairs(bars: Bars, settings: DetectionSettings) -> _Pairs:
     tree = cKDTree(bars.centre)
     near = tree.query_ball_point(bars.centre, settings.pos * bars.length, return_sorted=False)
     i = np.repeat(np.arange(len(bars)), [len(n) for n in near])
-    j = np.concatenate([np.asarray(n, dtype=np.int64) for n in near])
+    j = np.fromiter(itertools.chain.from_iterable(near), np.int64, i.size)
     longer = (bars.length[i] > bars.length[j]) | ((bars.length[i] == bars.length[j]) & (i < j))
     sine = np.abs(_cross(bars.axis[i], bars.axis[j]))
     keep = longer & (sine >= np.sin(np.radians(settings.angle_deg)))

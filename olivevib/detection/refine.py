@@ -14,19 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Floats, Grey
-from olivevib.detection.template import SAMPLES, Template
+from olivevib.detection.noise import noise_covariance
+from olivevib.detection.template import REACH, Template
 from olivevib.geometry import apply_homography
 
 Singles = NDArray[np.float32]
 
 UNKNOWNS = 15
-REACH = 0.6  # modules around the dark square whose pixels count
 LEAST_GAIN = 4.0  # grey levels between dark and white
 LEAST_PIXELS = 40
-MOVED_PX = 0.01  # convergence: no cornerstone moves farther in a pass
+MOST_COLUMNS = 32000  # that cv2.remap takes in one row
+CLEAR = 0.5  # weight above which a pixel counts as not covered
+MOVED_PX = 0.02  # a pass that moves no cornerstone farther is the last: the next is quadratic
 PASSES = 8
-DOUBT = 3.0  # standard deviations that make a correlation of the noise believable
-LAGS = 2  # px, up to which noise may be correlated
 
 
 @dataclass(frozen=True)
@@ -105,97 +105,159 @@ def marker_pixels(grey: Grey, H: Floats, modules: int, stride: int = 1) -> Pixel
 
 @dataclass
 class _State:
-    """Unknowns while they are fitted: W (3, 3) and (o, ox, oy, g, gx, gy, change of variance)."""
+    """Unknowns in the passes: W (3, 3), light (o, ox, oy, g, gx, gy), change of variance."""
 
     W: Floats
     light: Floats
     spread: float = 0.0
 
 
-def fit_template(
-    template: Template, pixels: Pixels, robust: bool = False, start: Floats | None = None
-) -> Fit | None:
-    """Fit the template to the pixels; None where there is no contrast or the system is singular.
+@dataclass(frozen=True)
+class _Settled:
+    """Where the passes ended: Jacobian (15, N), template level, residual and weight (N,)."""
 
-    start (3, 3): homography to the template to begin with, normalised; the identity if not given.
-    """
-    state = _State(np.eye(3) if start is None else start, np.zeros(6))
+    state: _State
+    J: Singles
+    T: Singles
+    residual: Singles
+    weight: Singles
+    converged: bool
+
+
+def approach(template: Template, pixels: Pixels) -> tuple[Floats, float] | None:
+    """A first, coarse fit: pose H (3, 3) and variance of the blur, px²; None where it is lost."""
+    end = _settle(template, pixels)
+    if end is None:
+        return None
+    H = _from_template(pixels, end.state.W) @ template.H
+    return H / H[2, 2], template.variance_px2 + end.state.spread
+
+
+def fit_template(template: Template, pixels: Pixels) -> Fit | None:
+    """Fit the template to the pixels; None where there is no contrast or the system is singular."""
+    end = _settle(template, pixels)
+    if end is None:
+        return None
+    WJ = end.J * end.weight
+    try:
+        inverse = np.linalg.inv((WJ @ end.J.T).astype(np.float64))
+    except np.linalg.LinAlgError:
+        return None
+    clear = end.weight > CLEAR
+    if clear.sum() <= 2 * UNKNOWNS:
+        return None
+    rms = float(np.sqrt((end.residual[clear] ** 2).sum() / (clear.sum() - UNKNOWNS)))
+    H = _from_template(pixels, end.state.W) @ template.H
+    counts = np.maximum(np.bincount(pixels.cell, minlength=9), 1)
+    estimate = inverse[:8].astype(np.float32) @ WJ
+    return Fit(
+        H=H / H[2, 2],
+        to_template=end.state.W,
+        covariance=noise_covariance(pixels, estimate, end.residual, clear),
+        centre=pixels.centre,
+        scale=pixels.scale,
+        gain=float(end.state.light[3]),
+        rms=rms,
+        variance_px2=template.variance_px2 + end.state.spread,
+        variance_sigma_px2=rms * float(np.sqrt(inverse[14, 14])),
+        weight=float(end.weight.mean()),
+        cells=(np.bincount(pixels.cell, end.weight, minlength=9) / counts).reshape(3, 3),
+        ncc=_correlation(end.T[clear], pixels.level[clear]),
+        converged=end.converged,
+    )
+
+
+def _settle(template: Template, pixels: Pixels) -> _Settled | None:
+    """Gauss-Newton with Tukey weights from the second pass on."""
+    state = _State(np.eye(3), np.zeros(6))
     reads = _read(template, pixels, state.W)
-    state.light = _light(pixels, reads[:, 0], np.ones_like(pixels.X))
-    converged = False
     weight = np.ones_like(pixels.X)
+    state.light = _light(pixels, reads[0])
+    converged = False
     for step in range(PASSES):
         J, residual = _linearised(pixels, reads, state)
-        if robust and step >= 1:
+        if step:
             weight = _tukey(residual, state.light[3])
-        WJ = J * weight[:, None]
-        A = (WJ.T @ J).astype(np.float64)
+        WJ = J * weight
+        A = (WJ @ J.T).astype(np.float64)
         A[np.diag_indices(UNKNOWNS)] *= 1 + 1e-7
         try:
-            change = np.asarray(np.linalg.solve(A, WJ.T @ residual), dtype=np.float64)
+            change = np.asarray(np.linalg.solve(A, WJ @ residual), dtype=np.float64)
         except np.linalg.LinAlgError:
             return None
         _add(state, change)
         if not (np.isfinite(change).all() and state.light[3] > LEAST_GAIN):
             return None
         reads = _read(template, pixels, state.W)
-        if np.abs(change[:8]).max() * pixels.scale < MOVED_PX:
+        if step and np.abs(change[:8]).max() * pixels.scale < MOVED_PX:
             converged = True
             break
-    return _finished(template, pixels, state, weight, converged)
+    T = reads[0] + np.float32(state.spread) * reads[3]
+    residual = pixels.level - _image(pixels, state, T)
+    return _Settled(state, J, T, residual, weight, converged)
 
 
 def _read(template: Template, pixels: Pixels, W: Floats) -> Singles:
-    """Texture (N, 4) at the pixels seen through W."""
+    """Texture (4, N) at the pixels seen through W."""
     X, Y = pixels.X, pixels.Y
     M = W.astype(np.float32)
     w = 1 / (M[2, 0] * X + M[2, 1] * Y + M[2, 2])
-    offset = (pixels.centre - template.origin_px) * SAMPLES
-    step = np.float32(pixels.scale * SAMPLES)
+    offset = (pixels.centre - template.origin_px) * template.samples
+    step = np.float32(pixels.scale * template.samples)
     x = (M[0, 0] * X + M[0, 1] * Y + M[0, 2]) * w * step + np.float32(offset[0])
     y = (M[1, 0] * X + M[1, 1] * Y + M[1, 2]) * w * step + np.float32(offset[1])
-    fold = 256  # cv2.remap takes at most 32767 columns
-    pad = -x.size % fold
-    at_x, at_y = (np.pad(m, (0, pad)).reshape(-1, fold) for m in (x, y))
-    out = cv2.remap(template.texture, at_x, at_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(out, dtype=np.float32).reshape(-1, 4)[: x.size]
+    parts = [
+        cv2.remap(
+            template.texture,
+            x[None, first : first + MOST_COLUMNS],
+            y[None, first : first + MOST_COLUMNS],
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+        for first in range(0, x.size, MOST_COLUMNS)
+    ]
+    return np.ascontiguousarray(np.concatenate(parts, axis=1)[0].T, dtype=np.float32)
 
 
-def _light(pixels: Pixels, T: Singles, weight: Singles) -> Floats:
+def _light(pixels: Pixels, T: Singles) -> Floats:
     """Planes of dark level and contrast (6,) by linear least squares."""
-    one = np.ones_like(T)
-    J = np.column_stack([one, pixels.X, pixels.Y, T, pixels.X * T, pixels.Y * T])
-    WJ = J * weight[:, None]
-    A = (WJ.T @ J).astype(np.float64) + 1e-3 * np.eye(6)
-    return np.asarray(np.linalg.solve(A, (WJ.T @ pixels.level).astype(np.float64)))
+    J = np.stack([np.ones_like(T), pixels.X, pixels.Y, T, pixels.X * T, pixels.Y * T])
+    A = (J @ J.T).astype(np.float64) + 1e-3 * np.eye(6)
+    return np.asarray(np.linalg.solve(A, (J @ pixels.level).astype(np.float64)))
+
+
+def _image(pixels: Pixels, state: _State, T: Singles) -> Singles:
+    """Grey levels (N,) that template level T has in the present light."""
+    X, Y = pixels.X, pixels.Y
+    o, ox, oy, g, gx, gy = state.light.astype(np.float32)
+    out: Singles = o + ox * X + oy * Y + (g + gx * X + gy * Y) * T
+    return out
 
 
 def _linearised(pixels: Pixels, reads: Singles, state: _State) -> tuple[Singles, Singles]:
-    """Jacobian (N, 15) and residual (N,) at the present unknowns."""
+    """Jacobian (15, N) and residual (N,) at the present unknowns."""
     X, Y = pixels.X, pixels.Y
-    o, ox, oy, g, gx, gy = state.light.astype(np.float32)
+    _, _, _, g, gx, gy = state.light.astype(np.float32)
     gain = g + gx * X + gy * Y
-    T = reads[:, 0] + np.float32(state.spread) * reads[:, 3]
-    residual = pixels.level - (o + ox * X + oy * Y) - gain * T
+    T = reads[0] + np.float32(state.spread) * reads[3]
+    residual = pixels.level - _image(pixels, state, T)
     M = state.W.astype(np.float32)
     w = 1 / (M[2, 0] * X + M[2, 1] * Y + M[2, 2])
-    Xt = (M[0, 0] * X + M[0, 1] * Y + M[0, 2]) * w
-    Yt = (M[1, 0] * X + M[1, 1] * Y + M[1, 2]) * w
     bend = gain * w * np.float32(pixels.scale)
-    p, q = bend * reads[:, 1], bend * reads[:, 2]
-    back = -(p * Xt + q * Yt)
-    J = np.empty((X.size, UNKNOWNS), dtype=np.float32)
-    columns = [p * X, p * Y, p, q * X, q * Y, q, back * X, back * Y]
-    columns += [np.ones_like(X), X, Y, T, X * T, Y * T, gain * reads[:, 3]]
-    for k, column in enumerate(columns):
-        J[:, k] = column
+    p, q = bend * reads[1], bend * reads[2]
+    back = (M[0, 0] * X + M[0, 1] * Y + M[0, 2]) * p + (M[1, 0] * X + M[1, 1] * Y + M[1, 2]) * q
+    back *= -w
+    one = np.ones_like(X)
+    homography = [p * X, p * Y, p, q * X, q * Y, q, back * X, back * Y]
+    J = np.stack([*homography, one, X, Y, T, X * T, Y * T, gain * reads[3]])
     return J, residual
 
 
 def _tukey(residual: Singles, gain: float) -> Singles:
     """Weights (1 - (r / 3k)²)², k = max(.12 gain, 1.3 rms of the inner residuals)."""
-    scale = max(0.12 * gain, 1.3 * 1.4826 * float(np.median(np.abs(residual))))
-    u = np.minimum(np.abs(residual) / (3 * scale), 1)
+    size = np.abs(residual)
+    scale = max(0.12 * gain, 1.3 * 1.4826 * float(np.median(size)))
+    u = np.minimum(size / np.float32(3 * scale), np.float32(1))
     out: Singles = (1 - u * u) ** 2
     return out
 
@@ -208,38 +270,9 @@ def _add(state: _State, change: Floats) -> None:
     state.spread += float(change[14])
 
 
-def _finished(
-    template: Template, pixels: Pixels, state: _State, weight: Singles, converged: bool
-) -> Fit | None:
-    reads = _read(template, pixels, state.W)
-    J, residual = _linearised(pixels, reads, state)
-    WJ = J * weight[:, None]
-    freedom = max(float(weight.sum()) - UNKNOWNS, 1.0)
-    variance = float((weight * residual**2).sum()) / freedom
-    try:
-        inverse = np.linalg.inv((WJ.T @ J).astype(np.float64))
-    except np.linalg.LinAlgError:
-        return None
-    H = _from_template(pixels, state.W) @ template.H
-    T = reads[:, 0]
-    seen = weight > 0.2
-    ncc = float(np.corrcoef(T[seen], pixels.level[seen])[0, 1]) if seen.sum() > UNKNOWNS else 0.0
-    counts = np.maximum(np.bincount(pixels.cell, minlength=9), 1)
-    return Fit(
-        H=H / H[2, 2],
-        to_template=state.W,
-        covariance=_spread(pixels, WJ @ inverse[:, :8].astype(np.float32), residual),
-        centre=pixels.centre,
-        scale=pixels.scale,
-        gain=float(state.light[3]),
-        rms=float(np.sqrt(variance)),
-        variance_px2=template.variance_px2 + state.spread,
-        variance_sigma_px2=float(np.sqrt(variance * inverse[14, 14])),
-        weight=float(weight.mean()),
-        cells=(np.bincount(pixels.cell, weight, minlength=9) / counts).reshape(3, 3),
-        ncc=ncc,
-        converged=converged,
-    )
+def _correlation(a: Singles, b: Singles) -> float:
+    a, b = a - a.mean(), b - b.mean()
+    return float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9))
 
 
 def _from_template(pixels: Pixels, W: Floats) -> Floats:
@@ -247,47 +280,6 @@ def _from_template(pixels: Pixels, W: Floats) -> Floats:
     N = np.array([[1, 0, -pixels.centre[0]], [0, 1, -pixels.centre[1]], [0, 0, pixels.scale]])
     N = N / pixels.scale
     out: Floats = np.linalg.inv(N) @ np.linalg.inv(W) @ N
-    return out
-
-
-def _spread(pixels: Pixels, E: Singles, residual: Singles) -> Floats:
-    """Covariance (8, 8) of estimates Σ E(x) r(x), E (N, 8), when neighbouring residuals agree.
-
-    C = Σ R(l) E(x) E(x + l) with R the residuals' own autocorrelation up to LAGS px: sharpened,
-    demosaiced, denoised and JPEG images have noise in which a pixel resembles its neighbours.
-    """
-    left, top = pixels.x.min() - LAGS, pixels.y.min() - LAGS
-    shape = (pixels.y.max() - top + LAGS + 1, pixels.x.max() - left + LAGS + 1)
-    at = (pixels.y - top, pixels.x - left)
-    field = np.zeros((*shape, 8), dtype=np.float32)
-    field[at] = E
-    noise = np.zeros(shape, dtype=np.float32)
-    noise[at] = residual
-    seen = np.zeros(shape, dtype=np.float32)
-    seen[at] = 1
-    kernel = _autocorrelation(noise, seen, residual.size - UNKNOWNS)
-    smeared = cv2.filter2D(field, -1, kernel, borderType=cv2.BORDER_CONSTANT)[at]
-    C: Floats = (E.T @ smeared).astype(np.float64)
-    return (C + C.T) / 2
-
-
-def _autocorrelation(noise: Singles, seen: Singles, freedom: int) -> Singles:
-    """Mean product of residuals at each lag up to LAGS, (2 LAGS + 1) squared, symmetric.
-
-    Correlations below DOUBT standard deviations of white noise count as none: their sum would make
-    the covariance of clean images uncertain.
-    """
-    height, width = noise.shape
-    out = np.zeros((2 * LAGS + 1, 2 * LAGS + 1), dtype=np.float32)
-    out[LAGS, LAGS] = variance = float(np.vdot(noise, noise)) / max(freedom, 1)
-    inner = np.s_[LAGS : height - LAGS, LAGS : width - LAGS]
-    for dy in range(LAGS + 1):
-        for dx in range(-LAGS if dy else 1, LAGS + 1):
-            moved = np.s_[LAGS + dy : height - LAGS + dy, LAGS + dx : width - LAGS + dx]
-            count = max(float(np.vdot(seen[inner], seen[moved])), 1.0)
-            value = float(np.vdot(noise[inner], noise[moved])) / count
-            if abs(value) * np.sqrt(count) > DOUBT * variance:
-                out[LAGS + dy, LAGS + dx] = out[LAGS - dy, LAGS - dx] = value
     return out
 
 

@@ -49,7 +49,11 @@ class SoftReader:
         self._area = np.flatnonzero(area)
         at = np.arange(n) - (n - 1) / 2
         v, u = np.meshgrid(at, at, indexing="ij")
-        self._plane = np.column_stack([np.ones(n * n), u.ravel(), v.ravel()])
+        plane = np.column_stack([np.ones(n * n), u.ravel(), v.ravel()])
+        self._planes = [
+            (np.linalg.pinv(plane[at]).T @ plane[self._area].T, at)
+            for at in (self._bars, self._white)
+        ]
 
     def match(self, grey: Grey, H: Floats) -> SoftMatch:
         """The nearest code through each of H (N, 3, 3); white must be lighter than dark."""
@@ -67,10 +71,7 @@ class SoftReader:
         """Dark and white level of each area module (N, c²) or (N, 1), in three ways."""
         bars, white = levels[:, self._bars], levels[:, self._white]
         medians = tuple(np.median(x, axis=1, keepdims=True) for x in (bars, white))
-        planes = tuple(
-            (np.linalg.pinv(self._plane[at]) @ x.T).T @ self._plane[self._area].T
-            for at, x in ((self._bars, bars), (self._white, white))
-        )
+        planes = [levels[:, at] @ through for through, at in self._planes]
         area = levels[:, self._area]
         extremes = (area.min(axis=1, keepdims=True), area.max(axis=1, keepdims=True))
         return [(medians[0], medians[1]), (planes[0], planes[1]), extremes]

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from olivevib.arrays import Bools, Floats
 from olivevib.geometry import apply_homography
 
-SAMPLES = 4  # texture samples a pixel
+FINE, COARSE = 4, 2  # texture samples a pixel: to measure with, to approach with
 PIXEL_VARIANCE = 1 / 12  # px² of a pixel's own area, as a Gaussian
 LEAST_BLUR = 0.3  # texture samples; sharper cannot be drawn
-MARGIN_PX = 4.0  # texture beyond the white card
+REACH = 0.6  # modules around the dark square that are drawn
+MARGIN_PX = 4.0  # and px around these; beyond them the edge is repeated
 FINENESS = (4, 8, 16, 32)  # drawn samples a module
 
 
@@ -29,13 +30,14 @@ class Template:
     half its Laplacian per px² (the derivative by the variance of the blur).
 
     origin_px (2,): image point of texture sample (0, 0); H (3, 3): start pose, centred modules to
-    px; variance_px2: PSF² + 1/12.
+    px; variance_px2: PSF² + 1/12; samples a pixel.
     """
 
     texture: NDArray[np.float32]
     origin_px: Floats
     H: Floats
     variance_px2: float
+    samples: int
 
 
 def card(dark: Bools, quiet: int) -> NDArray[np.float32]:
@@ -43,20 +45,22 @@ def card(dark: Bools, quiet: int) -> NDArray[np.float32]:
     return np.pad(np.where(dark, 0, 1), quiet, constant_values=1).astype(np.float32)
 
 
-def draw_template(white: NDArray[np.float32], H: Floats, variance_px2: float) -> Template:
-    """Draw a card (n, n) at pose H with a blur of ``variance_px2``; beyond the card it stays white.
+def draw_template(
+    white: NDArray[np.float32], H: Floats, variance_px2: float, quiet: int = 2, samples: int = FINE
+) -> Template:
+    """Draw a card (n, n) with its ``quiet`` zone at pose H with a blur of ``variance_px2``.
 
     Degenerates for a blur below 0.1 px²: the texture's own sampling is then the blur.
     """
-    n = len(white)
-    half = n / 2
-    outline = apply_homography(H, [[-half, -half], [half, -half], [half, half], [-half, half]])
-    origin = np.floor(outline.min(axis=0) - MARGIN_PX)
-    width, height = (np.ceil(outline.max(axis=0) + MARGIN_PX) - origin).astype(int) * SAMPLES + 1
+    half = len(white) / 2
+    reach = half - quiet + REACH
+    box = apply_homography(H, [[-reach, -reach], [reach, -reach], [reach, reach], [-reach, reach]])
+    origin = np.floor(box.min(axis=0) - MARGIN_PX)
+    width, height = (np.ceil(box.max(axis=0) + MARGIN_PX) - origin).astype(int) * samples + 1
     module_px = _module_px(H)
-    fine = min(FINENESS, key=lambda m: abs(np.log(m / (0.7 * SAMPLES * module_px))))
-    drawn = np.kron(white, np.ones((fine, fine), dtype=np.float32))
-    to_image = np.array([[1 / SAMPLES, 0, origin[0]], [0, 1 / SAMPLES, origin[1]], [0, 0, 1]])
+    fine = min(FINENESS, key=lambda m: abs(np.log(m / (0.7 * samples * module_px))))
+    drawn = white.repeat(fine, axis=0).repeat(fine, axis=1)
+    to_image = np.array([[1 / samples, 0, origin[0]], [0, 1 / samples, origin[1]], [0, 0, 1]])
     to_drawn = np.array([[fine, 0, fine * half - 0.5], [0, fine, fine * half - 0.5], [0, 0, 1]])
     level = cv2.warpPerspective(
         drawn,
@@ -65,15 +69,16 @@ def draw_template(white: NDArray[np.float32], H: Floats, variance_px2: float) ->
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_REPLICATE,
     )
-    own = 1 / (6 * SAMPLES**2) + (module_px / fine) ** 2 / 12  # bilinear reads, drawn ramps
-    sigma = SAMPLES * np.sqrt(max(variance_px2 - own, 0.0))
+    own = 1 / (6 * samples**2) + (module_px / fine) ** 2 / 12  # bilinear reads, drawn ramps
+    sigma = samples * float(np.sqrt(max(variance_px2 - own, 0.0)))
     if sigma > LEAST_BLUR:
-        level = cv2.GaussianBlur(level, (0, 0), float(sigma), borderType=cv2.BORDER_REPLICATE)
-    x = cv2.Sobel(level, cv2.CV_32F, 1, 0, ksize=1, scale=0.5 * SAMPLES)
-    y = cv2.Sobel(level, cv2.CV_32F, 0, 1, ksize=1, scale=0.5 * SAMPLES)
-    laplacian = cv2.Laplacian(level, cv2.CV_32F, ksize=1, scale=0.5 * SAMPLES**2)
+        size = 2 * int(np.ceil(3 * sigma)) + 1
+        level = cv2.GaussianBlur(level, (size, size), sigma, borderType=cv2.BORDER_REPLICATE)
+    x = cv2.Sobel(level, cv2.CV_32F, 1, 0, ksize=1, scale=0.5 * samples)
+    y = cv2.Sobel(level, cv2.CV_32F, 0, 1, ksize=1, scale=0.5 * samples)
+    laplacian = cv2.Laplacian(level, cv2.CV_32F, ksize=1, scale=0.5 * samples**2)
     texture = np.asarray(cv2.merge([level, x, y, laplacian]), dtype=np.float32)
-    return Template(texture, origin, H, variance_px2)
+    return Template(texture, origin, H, variance_px2, samples)
 
 
 def _module_px(H: Floats) -> float:

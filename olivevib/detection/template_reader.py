@@ -11,20 +11,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from olivevib.arrays import Bools, Floats, Grey, Ints
-from olivevib.detection.candidates import fine_bars, shadowed_dark, sharpened_dark
+from olivevib.detection.candidates import dark_passes, fine_bars
 from olivevib.detection.detection import Detection
 from olivevib.detection.hypotheses import Frames, frame_hypotheses, joined
-from olivevib.detection.refine import Fit, Singles, fit_template, marker_pixels, point_jacobian
+from olivevib.detection.refine import (
+    Fit,
+    Singles,
+    approach,
+    fit_template,
+    marker_pixels,
+    point_jacobian,
+)
 from olivevib.detection.settings import DetectionSettings
 from olivevib.detection.softcode import SoftMatch, SoftReader
-from olivevib.detection.template import PIXEL_VARIANCE, card, draw_template
+from olivevib.detection.template import COARSE, PIXEL_VARIANCE, card, draw_template
 from olivevib.geometry import apply_homography
-from olivevib.marker import MarkerLibrary
+from olivevib.marker import MarkerLayout, MarkerLibrary
 
 FIRST_VARIANCE_PX2 = 0.7**2 + PIXEL_VARIANCE  # blur at which a marker is drawn first
 VARIANCES_PX2 = (0.15, 6.0)  # blur that is believed
 REDRAWN_PX2 = 0.12  # change of the blur that asks for a new drawing
-COARSE_PX = 26.0  # centre to corner; above it the first fit uses every second pixel
+COARSE_PX = 15.0  # centre to corner for each pixel of stride in the first fit
 TRIED_WRONG = 8  # modules of 49 that a hypothesis may have wrong before it is fitted
 WRONG = (4, 6)  # after the fit: clear, and where a part is covered
 NCC = (0.75, 0.6)
@@ -92,11 +99,7 @@ class TemplateReader:
 
     def _hypotheses(self, grey: Grey) -> Frames:
         layout = self.library.layout
-        parts = [
-            frame_hypotheses(fine_bars(dark), layout)
-            for dark in (sharpened_dark(grey), shadowed_dark(grey))
-        ]
-        return joined(parts)
+        return joined([frame_hypotheses(fine_bars(dark), layout) for dark in dark_passes(grey)])
 
     def _fitted(self, grey: Grey, frames: Frames) -> list[_Found]:
         """Accepted markers; of several fits of one code at one place the first stands."""
@@ -105,21 +108,21 @@ class TemplateReader:
         H = frames.homographies()
         match = self._soft.match(grey, H)
         found: list[_Found] = []
-        places: list[Floats] = []
+        places = np.empty((0, 2))
         for k in _order(frames, match, self.library.layout.code):
             near = max(3.0, 0.25 * 11 * float(np.linalg.norm(frames.a[k])))
-            if any(np.linalg.norm(frames.centre[k] - p) < near for p in places):
+            if (((places - frames.centre[k]) ** 2).sum(axis=1) < near * near).any():
                 continue
             one = self._fit(grey, H[k], int(match.row[k]), int(match.turn[k]))
             if one is not None:
                 found.append(one)
-                places.append(one.H[:2, 2] / one.H[2, 2])
+                places = np.vstack([places, one.H[:2, 2] / one.H[2, 2]])
         return found
 
     def _fit(self, grey: Grey, H: Floats, row: int, turn: int) -> _Found | None:
         """Fit the drawing of one code, turned as it was read, and accept or refuse it."""
         start = _turned(H, turn)
-        fit = fit_card(grey, self._cards[row], start, self.library.layout.modules)
+        fit = fit_card(grey, self._cards[row], start, self.library.layout)
         if fit is None or not _sound(fit, start, self.library.layout.cornerstones):
             return None
         again = self._soft.match(grey, fit.H[None])
@@ -150,29 +153,35 @@ class TemplateReader:
         )
 
 
-def fit_card(grey: Grey, white: Singles, H: Floats, modules: int) -> Fit | None:
+def fit_card(grey: Grey, white: Singles, H: Floats, layout: MarkerLayout) -> Fit | None:
     """Fit a card to the image from pose H: first coarsely, then drawn again where it was found.
 
     None where it does not fit: no contrast, outside the image, lost.
     """
-    pixels = marker_pixels(grey, H, modules)
+    stride = max(1, round(_reach_px(H, layout) / COARSE_PX))
+    pixels = marker_pixels(grey, H, layout.modules, stride)
     if pixels is None:
         return None
-    if pixels.scale > COARSE_PX:
-        pixels = marker_pixels(grey, H, modules, stride=2) or pixels
-    fit = fit_template(draw_template(white, H, FIRST_VARIANCE_PX2), pixels, robust=True)
-    variance = FIRST_VARIANCE_PX2
+    first = draw_template(white, H, FIRST_VARIANCE_PX2, layout.quiet, COARSE)
+    found = approach(first, pixels)
     for _ in range(2):
-        if fit is None or not np.isfinite(fit.H).all():
+        if found is None or not np.isfinite(found[0]).all():
             return None
-        pixels = marker_pixels(grey, fit.H, modules)
+        H, variance = found[0], float(np.clip(found[1], *VARIANCES_PX2))
+        pixels = marker_pixels(grey, H, layout.modules)
         if pixels is None:
             return None
-        variance = float(np.clip(fit.variance_px2, *VARIANCES_PX2))
-        fit = fit_template(draw_template(white, fit.H, variance), pixels, robust=True)
+        fit = fit_template(draw_template(white, H, variance, layout.quiet), pixels)
         if fit is None or abs(fit.variance_px2 - variance) < REDRAWN_PX2:
             break
+        found = fit.H, fit.variance_px2
     return fit
+
+
+def _reach_px(H: Floats, layout: MarkerLayout) -> float:
+    """Mean distance from centre to cornerstones, px."""
+    px = apply_homography(H, np.vstack([[[0.0, 0.0]], layout.cornerstones]))
+    return float(np.linalg.norm(px[1:] - px[0], axis=1).mean())
 
 
 def _sound(fit: Fit, start: Floats, stones: Floats) -> bool:

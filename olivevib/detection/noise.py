@@ -1,0 +1,64 @@
+"""The covariance of a fit when neighbouring pixels' noise agrees.
+
+In sharpened, demosaiced, denoised and JPEG images a pixel's noise resembles its neighbours':
+C = Σ R(l) E(x) E(x + l) over lags l, with R the residuals' own autocorrelation.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from olivevib.arrays import Bools, Floats
+
+if TYPE_CHECKING:
+    from olivevib.detection.refine import Pixels, Singles
+
+LAGS = 2  # px, up to which noise may be correlated
+DOUBT = 3.0  # standard deviations that make a correlation of the noise believable
+UNKNOWNS = 15
+
+
+def noise_covariance(pixels: Pixels, E: Singles, residual: Singles, clear: Bools) -> Floats:
+    """Covariance (8, 8) of estimates Σ E(x) r(x), E (8, N), from the residuals that are clear."""
+    left, top = int(pixels.x.min()) - LAGS, int(pixels.y.min()) - LAGS
+    shape = (int(pixels.y.max()) - top + LAGS + 1, int(pixels.x.max()) - left + LAGS + 1)
+    at = (pixels.y - top) * shape[1] + (pixels.x - left)
+    noise = np.zeros(shape, dtype=np.float32)
+    noise.ravel()[at] = np.where(clear, residual, 0)
+    seen = np.zeros(shape, dtype=np.float32)
+    seen.ravel()[at] = clear
+    kernel = autocorrelation(noise, seen)
+    if np.count_nonzero(kernel) == 1:
+        white: Floats = (kernel[LAGS, LAGS] * (E @ E.T)).astype(np.float64)
+        return white
+    field = np.zeros((shape[0] * shape[1], 8), dtype=np.float32)
+    field[at] = E.T
+    smeared = cv2.filter2D(field.reshape(*shape, 8), -1, kernel, borderType=cv2.BORDER_CONSTANT)
+    C: Floats = (E @ smeared.reshape(-1, 8)[at]).astype(np.float64)
+    return (C + C.T) / 2
+
+
+def autocorrelation(noise: Singles, seen: Singles) -> Singles:
+    """Mean product of residuals at each lag up to LAGS, (2 LAGS + 1) squared, symmetric.
+
+    noise, seen (h, w): residuals and whether they count (1), with a border of LAGS zeros.
+    Correlations below DOUBT standard deviations of white noise count as none: their sum would make
+    the covariance of clean images uncertain.
+    """
+    height, width = noise.shape
+    out = np.zeros((2 * LAGS + 1, 2 * LAGS + 1), dtype=np.float32)
+    freedom = max(float(seen.sum()) - UNKNOWNS, 1.0)
+    out[LAGS, LAGS] = variance = float(np.vdot(noise, noise)) / freedom
+    rows, columns = slice(0, height - LAGS), slice(LAGS, width - LAGS)
+    a, b = noise[rows, columns], seen[rows, columns]
+    for dy in range(LAGS + 1):
+        for dx in range(-LAGS if dy else 1, LAGS + 1):
+            moved = np.s_[dy : height - LAGS + dy, LAGS + dx : width - LAGS + dx]
+            count = max(float((b * seen[moved]).sum()), 1.0)
+            value = float((a * noise[moved]).sum()) / count
+            if abs(value) * np.sqrt(count) > DOUBT * variance:
+                out[LAGS + dy, LAGS + dx] = out[LAGS - dy, LAGS - dx] = value
+    return out
