@@ -13,8 +13,9 @@ from olivevib.report import tables
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
 from olivevib.report.figures import pair_distances
+from olivevib.report.lines import MEANING
 from olivevib.report.plates import Plate, plates
-from olivevib.report.verdict import MEANING, verdict
+from olivevib.report.verdict import verdict
 from olivevib.signals import State
 
 
@@ -96,7 +97,9 @@ def render_page(content: ReportContent, tick: Tick = silent) -> str:
         ],
         frame=clean(content.trajectory.frame) if content.trajectory else "",
         phases=[
-            (clean(p.name, 30), f"{p.start_s:.2f} – {p.end_s:.2f}\u00a0s") for p in content.phases
+            (clean(p.name, 30), f"{p.start_s:.2f} – {p.end_s:.2f}\u00a0s")
+            for p in content.phases
+            if p.name != "whole"
         ],
         stages=tables.stage_rows(content),
         command=clean(content.provenance.get("command", "")),
@@ -134,9 +137,18 @@ def _reasons(content: ReportContent) -> list[tuple[str, str]]:
     found: dict[str, list[str]] = defaultdict(list)
     for marker_id, line in content.lines().items():
         for reason in line.reasons:
-            found[clean(reason)].append(str(marker_id))
+            found[clean(reason).rstrip(".")].append(str(marker_id))
     every = len(content.lines())
-    return [("all" if len(ids) == every else ", ".join(ids), why) for why, ids in found.items()]
+    word = {1: "Marker"}
+    return [
+        (
+            "All markers"
+            if len(ids) == every
+            else f"{word.get(len(ids), 'Markers')} {', '.join(ids)}",
+            why,
+        )
+        for why, ids in found.items()
+    ]
 
 
 def _words(comparison: Comparison) -> str:

@@ -11,7 +11,6 @@ from olivevib.progress import Tick, silent
 from olivevib.report import figures
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
-from olivevib.report.verdict import strongest
 from olivevib.report.words import number
 from olivevib.signals import fit_stamps
 from olivevib.vibration import Spectrum
@@ -70,46 +69,51 @@ def _space(content: ReportContent) -> Iterator[_Job]:
     if path is None or not ids:
         return
     for group in _groups(ids, ROWS):
-        yield ("motion", _MOTION, _bound(figures.time_series, path, names, group,
-                                         figures.whole(path), content.phases))  # fmt: skip
-    close = _close(content, ids)
-    yield (
-        "motion",
-        _CLOSE,
-        lambda: figures.time_series(path, names, close[1], close[0], (), lines),
-    )
+        yield ("motion", _once(_MOTION, group, ids), _bound(
+            figures.time_series, path, names, group, figures.whole(path), content.phases
+        ))  # fmt: skip
+    window, closest = _close(content, ids)
+    if window is not None:
+        caption = _CLOSE.format(length=number(window.end_s - window.start_s, 2))
+        yield (
+            "motion",
+            caption,
+            _bound(figures.time_series, path, names, closest, window, (), lines),
+        )
     reach = figures.orbit_reach_mm(path, ids)
     for group in _groups(ids, figures.MOST_ACROSS):
-        caption = _ORBITS.format(reach=number(reach, 3))
+        caption = _once(_ORBITS.format(reach=number(reach, 3)), group, ids)
         yield ("orbits", caption, _bound(figures.orbits, path, names, group, reach, lines))
     pairs = figures.pair_distances(path)
     if pairs:
         yield ("distances", _DISTANCES, lambda: figures.distances(path, pairs, names))
 
 
+def _once(caption: str, group: Sequence[int], ids: Sequence[int]) -> str:
+    """The caption below the first figure of a series; the others only say that they go on."""
+    return caption if group[0] == ids[0] else "The same for the other markers."
+
+
 def _bound(function: Callable[..., str], *values: object) -> Callable[[], str]:
     return lambda: function(*values)
 
 
-def _close(content: ReportContent, ids: Sequence[int]) -> tuple[figures.Window, list[int]]:
-    """A second in the middle of the steady phase, of the three markers that move most."""
-    path = content.trajectory
+def _close(content: ReportContent, ids: Sequence[int]) -> tuple[figures.Window | None, list[int]]:
+    """A second (or 15 frames) of the steady phase, and the three markers that move most."""
+    path, lines = content.trajectory, content.lines()
     assert path is not None
-    steady = [span for span in content.phases if span.name == "steady"]
+    steady = [(span.start_s, span.end_s) for span in content.phases if span.name == "steady"]
     whole = figures.whole(path)
-    start, end = (steady[0].start_s, steady[0].end_s) if steady else (whole.start_s, whole.end_s)
-    middle = (start + end) / 2
-    window = figures.Window(middle - CLOSE_S / 2, middle + CLOSE_S / 2, close=True)
-    lines = content.lines()
 
     def size(marker_id: int) -> float:
         line = lines.get(marker_id)
         total = 0.0 if line is None else float(np.sum(line.amplitude**2))
         return total if np.isfinite(total) else 0.0
 
-    first = strongest(content)
-    ranked = sorted(ids, key=lambda i: (first is None or i != first[0], -size(i)))
-    return window, sorted(ranked[:3])
+    ranked = sorted(ids, key=lambda i: -size(i))[:3]
+    length_s = max(CLOSE_S, 7.5 / half_rate_hz(content))
+    span = steady[0] if steady else (whole.start_s, whole.end_s)
+    return figures.close_window(path, ranked[0], span, length_s), sorted(ranked)
 
 
 def half_rate_hz(content: ReportContent) -> float:
@@ -129,6 +133,7 @@ def _spectra(content: ReportContent) -> Iterator[_Job]:
     for each in [s for s in (spectrum, acceleration) if s is not None]:
         for group in _groups(_finite_ids(each), ROWS):
             words = _AMPLITUDE.format(of=each.quantity) + _window_words(each, half)
+            words = _once(words, group, _finite_ids(each))
             yield ("spectra", words, _bound(figures.amplitude_spectra, each, names, group, half))
     for group in _groups(_finite_ids(spectrum), 12):
         job = _bound(figures.power_spectra, spectrum, names, group, half)
@@ -147,7 +152,7 @@ def _window_words(s: Spectrum, half_hz: float) -> str:
     """How a spectrum was made: phase, window, bins, and where its axis ends."""
     span = f", {s.start_s:.2f} to {s.end_s:.2f} s" if np.isfinite(s.start_s + s.end_s) else ""
     return (
-        f" Phase: {clean(s.phase, 20)}{span}; {clean(s.window, 20)} window,"
+        f" Phase: {clean(s.phase, 20)}{span}; {clean(s.window, 20).capitalize()} window,"
         f" {number(s.resolution_hz, 3)} Hz between bins, noise bandwidth"
         f" {number(s.enbw_bins, 3)} bins; axis up to half the frame rate, {number(half_hz, 4)} Hz."
     )
@@ -184,12 +189,13 @@ _SCENE = (
     " Coordinates are those of the left camera: x to the right, y down, z away from it."
 )
 _MOTION = (
-    "Displacement of each marker from its mean position. One scale a row; a gap is a gap, with a"
+    "Displacement of each marker from its mean position, while any marker was located. One scale a"
+    " row; a gap is a gap, with a"
     " bar at the bottom where the marker was not located; circles are doubtful samples; grey:"
     " start-up, shut-down and decay."
 )
 _CLOSE = (
-    "One second of the markers that move most: dots are single frames, the thin grey curve is the"
+    "{length} s of the markers that move most: dots are single frames, the thin grey curve is the"
     " fitted line where its frequency is known."
 )
 _ORBITS = (

@@ -12,10 +12,11 @@ from olivevib.comparison import Comparison
 from olivevib.geometry import CameraModel
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
-from olivevib.report.figures import Distance, describe
+from olivevib.report.figures import Distance
+from olivevib.report.lines import MOST, candidates_text, describe
 from olivevib.report.words import NOT_KNOWN, fact, known, measure, number, percent, plain, seconds
 from olivevib.signals import State, fit_stamps
-from olivevib.vibration import Line
+from olivevib.vibration import Line, LineStatus
 
 Pair = tuple[str, str]  # label, value with unit
 
@@ -86,7 +87,12 @@ def marker_rows(content: ReportContent) -> list[MarkerRow]:
 
 
 def _candidates(listed: Sequence[float], line: Line | None) -> tuple[str, ...]:
+    """The candidates one by one while they are few; none where the line is not to be seen."""
+    if line is not None and line.status in (LineStatus.BLIND, LineStatus.CHIRP):
+        return ()
     shares = line.probabilities if line is not None else ()
+    if len(listed) > MOST:
+        return (candidates_text(listed),)
     if len(shares) == len(listed):
         return tuple(
             f"{plain(f, 2)} Hz ({share:.0%})" for f, share in zip(listed, shares, strict=True)
@@ -99,7 +105,9 @@ def _acceleration(content: ReportContent, marker: Mapping[str, Any]) -> tuple[st
     if known(value):
         return (measure(value, digits=3),)
     each = candidate_accelerations(content, int(marker["id"]))
-    listed = tuple(f"{measure(a, '', s)} if {plain(f, 2)} Hz" for f, a, s in each)
+    listed = tuple(f"{measure(a, '', s)} if {plain(f, 2)} Hz" for f, a, s in each[:MOST])
+    if len(each) > MOST:
+        listed += (f"up to {measure(each[-1][1], digits=3)} if {plain(each[-1][0], 2)} Hz",)
     return listed or (NOT_KNOWN,)
 
 

@@ -6,21 +6,10 @@ import numpy as np
 
 from olivevib.comparison import Verdict
 from olivevib.report.content import ReportContent
-from olivevib.report.figures.spectra import describe
+from olivevib.report.lines import MEANING, MOST, OPEN, candidates_text, describe
 from olivevib.report.tables import candidate_accelerations
-from olivevib.report.words import count, measure, number, percent, plain, triple
+from olivevib.report.words import count, measure, number, percent, triple
 from olivevib.vibration.types import Line, LineStatus
-
-MEANING: dict[LineStatus, str] = {
-    LineStatus.DIRECT: "sampled more than twice as fast as the declared band, so no alias exists",
-    LineStatus.CONFIRMED: "decided by the times at which the rows were read, and checked",
-    LineStatus.SUPPORTED: "probably so; another frequency is not excluded",
-    LineStatus.AMBIGUOUS: "two or more frequencies explain the pictures equally well",
-    LineStatus.BLIND: "looks like slow sway at this frame rate; no amplitude is given",
-    LineStatus.CHIRP: "the speed changes too fast to resolve a line",
-    LineStatus.ALIASED: "peaks of samples only: each could be any of the candidates",
-    LineStatus.NONE: "no line stands out of the noise",
-}
 
 AXES = "x\u00a0/\u00a0y\u00a0/\u00a0z"
 _AGREEMENT = {
@@ -68,18 +57,18 @@ def _vibration(content: ReportContent) -> str:
         return "Its vibration has not been analysed yet."
     found = strongest(content)
     if found is None:
-        return "No vibration line stands out of the noise at any marker."
+        return _without_amplitude(content)
     marker_id, line = found
     name = content.marker_name(marker_id)
     axis = int(np.argmax(line.amplitude))
     size = measure(line.amplitude[axis], "mm", line.amplitude_sigma[axis])
     moves = f"by {size} (peak) along {'xyz'[axis]}"
-    if line.status in (LineStatus.AMBIGUOUS, LineStatus.ALIASED) and line.candidates_hz:
-        either = " or ".join(plain(f, 2) for f in line.candidates_hz[:4])
-        rms = candidate_accelerations(content, marker_id)[:4]
+    if line.status in OPEN and line.candidates_hz:
+        either = candidates_text(line.candidates_hz)
+        rms = candidate_accelerations(content, marker_id)[:MOST]
         shake = " or ".join(number(a, 3) for _, a, _ in rms)
         return (
-            f"Marker {name} moves most, {moves}, but its frequency is {line.status}: {either} Hz"
+            f"Marker {name} moves most, {moves}, but its frequency is {line.status}: {either}"
             " all give these pictures"
             + (f", so its acceleration is {shake} m/s² rms" if shake else "")
             + "; nothing here decides which."
@@ -88,6 +77,19 @@ def _vibration(content: ReportContent) -> str:
     same = sum(status is line.status for status in others)
     rest = f"; {same} of the {len(others)} others are {line.status} too" if others else ""
     return f"Marker {name} moves most, {moves}, at {describe(line)}{rest}."
+
+
+def _without_amplitude(content: ReportContent) -> str:
+    """What is said where no marker has a line with an amplitude."""
+    lines = list(content.lines().values())
+    statuses = [line.status for line in lines if line.status is not LineStatus.NONE]
+    if not statuses:
+        return "No vibration line stands out of the noise at any marker."
+    most = max(dict.fromkeys(statuses), key=statuses.count)
+    return (
+        f"No amplitude can be given: at {statuses.count(most)} of {count(len(lines), 'marker')}"
+        f" the line is {most} ({MEANING[most]})."
+    )
 
 
 def _trust(content: ReportContent) -> str:

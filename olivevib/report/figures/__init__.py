@@ -5,13 +5,13 @@ from __future__ import annotations
 from olivevib.report.figures.boxes import boxes
 from olivevib.report.figures.distances import Distance, distances, pair_distances
 from olivevib.report.figures.frequency import frequencies
-from olivevib.report.figures.motion import Window, time_series, whole
+from olivevib.report.figures.motion import Window, close_window, time_series, whole
 from olivevib.report.figures.orbits import MOST_ACROSS, orbit_reach_mm, orbits
 from olivevib.report.figures.residuals import holdout, residual_map
 from olivevib.report.figures.scene import scene
 from olivevib.report.figures.sensor import overlay
 from olivevib.report.figures.sigma import sigmas
-from olivevib.report.figures.spectra import amplitude_spectra, describe, power_spectra
+from olivevib.report.figures.spectra import amplitude_spectra, power_spectra
 from olivevib.report.figures.visibility import strips, visibility
 
 __all__ = [
@@ -20,7 +20,7 @@ __all__ = [
     "Window",
     "amplitude_spectra",
     "boxes",
-    "describe",
+    "close_window",
     "distances",
     "frequencies",
     "holdout",

@@ -13,6 +13,7 @@ from matplotlib.patches import Rectangle
 from olivevib.arrays import Floats
 from olivevib.reconstruction.trajectory import Trajectory
 from olivevib.report.figures import canvas
+from olivevib.report.figures.motion import whole
 
 FEWEST = 5  # frames in which both markers must have been seen
 
@@ -78,8 +79,8 @@ def distances(trajectory: Trajectory, pairs: Sequence[Distance], names: Mapping[
         )
         ax.tick_params(axis="y", length=0, labelcolor=canvas.INK)
         ax.set_ylim(len(shown) - 0.4, -0.6)
-        if trajectory.t_s.size > 1:
-            ax.set_xlim(trajectory.t_s[0], trajectory.t_s[-1])
+        window = whole(trajectory)
+        ax.set_xlim(window.start_s, window.end_s)
         ax.set_xlabel("trial clock, s")
         ax.spines["left"].set_visible(False)
         ax.set_title(f"distance less its mean; one row = {span:.3g} mm; ± standard deviation, mm",

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from olivevib.report.figures import canvas
-from olivevib.report.figures.spectra import describe
-from olivevib.vibration.types import Line, LineStatus, Spectrum
+from olivevib.report.lines import KNOWN, OPEN, describe
+from olivevib.vibration import Line, LineStatus, Spectrum
 
-OPEN_STATUSES = (LineStatus.AMBIGUOUS, LineStatus.ALIASED)
+MOST_FOLDS = 6  # multiples of half the frame rate that are labelled
 
 
 def frequencies(spectrum: Spectrum, names: Mapping[int, str], nyquist_hz: float) -> str:
@@ -29,11 +29,14 @@ def frequencies(spectrum: Spectrum, names: Mapping[int, str], nyquist_hz: float)
         ax = canvas.rows_and_columns(
             figure, 1, 1, margins_in=(1.75, 2.35, 0.25, 0.45), gaps_in=(0, 0)
         )[0][0]
-        for k in range(1, int(top / nyquist) + 1):
+        folds = int(top / nyquist)
+        for k in range(1, folds + 1):
             ax.axvline(k * nyquist, color=canvas.GRID, lw=0.9)
             words = f"half the frame rate, {nyquist:.4g} Hz" if k == 1 else f"{k * nyquist:.4g} Hz"
-            ax.text(k * nyquist, -0.75, words, ha="center", va="bottom", fontsize=6.5,
-                    color=canvas.QUIET)  # fmt: skip
+            if k == 1 or folds <= MOST_FOLDS:
+                side = "left" if k == 1 and nyquist < 0.3 * top else "center"
+                ax.text(k * nyquist, -0.75, words, ha=side, va="bottom", fontsize=6.5,
+                        color=canvas.QUIET)  # fmt: skip
         ax.axvspan(nyquist, top, color=canvas.SHADE, lw=0, zorder=0)
         for row, line in enumerate(spectrum.lines):
             _line(ax, row, line)
@@ -49,18 +52,20 @@ def frequencies(spectrum: Spectrum, names: Mapping[int, str], nyquist_hz: float)
 
 
 def _all(line: Line) -> Sequence[float]:
-    return [f for f in (line.f_hz, *line.candidates_hz) if np.isfinite(f)]
+    """The frequencies that are drawn for a line."""
+    drawn = line.candidates_hz if line.status in OPEN else (line.f_hz,)
+    return [f for f in drawn if np.isfinite(f)] if line.status in (*KNOWN, *OPEN) else []
 
 
 def _line(ax: Axes, row: int, line: Line) -> None:
     colour = canvas.MARK
-    if line.status in OPEN_STATUSES and line.candidates_hz:
+    if line.status in OPEN and line.candidates_hz:
         f = np.array(line.candidates_hz)
         ax.plot(f, np.full(f.size, row), ls=(0, (1, 2)), color=colour, lw=0.8)
         ax.plot(f, np.full(f.size, row), "o", mfc="none", mec=colour, ms=5, mew=1)
         for where, share in zip(line.candidates_hz, line.probabilities, strict=False):
             ax.text(where, row - 0.2, f"{share:.0%}", fontsize=6, ha="center", va="bottom")
-    elif np.isfinite(line.f_hz):
+    elif line.status in KNOWN and np.isfinite(line.f_hz):
         sigma = line.f_sigma_hz if np.isfinite(line.f_sigma_hz) else None
         sure = line.status in (LineStatus.DIRECT, LineStatus.CONFIRMED)
         face = colour if sure else "none"

@@ -12,10 +12,11 @@ from matplotlib.figure import Figure
 from olivevib.arrays import Floats, Ints
 from olivevib.reconstruction.trajectory import Trajectory
 from olivevib.report.figures import canvas
+from olivevib.report.lines import KNOWN
 from olivevib.signals import State
-from olivevib.vibration import Line, LineStatus, Phase
+from olivevib.vibration import Line, Phase
 
-TRUE_STATUSES = (LineStatus.DIRECT, LineStatus.CONFIRMED, LineStatus.SUPPORTED)
+FEWEST = 5  # samples that are worth a close-up
 
 
 @dataclass(frozen=True)
@@ -28,9 +29,28 @@ class Window:
 
 
 def whole(trajectory: Trajectory) -> Window:
-    """The window over the whole record."""
-    t_s = trajectory.t_s
-    return Window(float(t_s[0]), float(t_s[-1])) if t_s.size else Window(0.0, 1.0)
+    """The window from the first to the last frame in which any marker was located."""
+    t_s = trajectory.t_s[trajectory.seen.any(axis=1)]
+    return Window(float(t_s[0]), float(t_s[-1])) if t_s.size > 1 else Window(0.0, 1.0)
+
+
+def close_window(
+    trajectory: Trajectory, marker_id: int, span: tuple[float, float], length_s: float
+) -> Window | None:
+    """A stretch of ``length_s`` within ``span`` with the most samples of a marker; None: too few.
+
+    Among equals the one nearest to the middle of the span.
+    """
+    m = int(np.flatnonzero(trajectory.ids == marker_id)[0])
+    times = trajectory.t_s[trajectory.seen[:, m]]
+    times = times[(times >= span[0]) & (times <= span[1])]
+    if times.size < FEWEST:
+        return None
+    middle = (span[0] + span[1]) / 2
+    counts = np.searchsorted(times, times + length_s) - np.arange(times.size)
+    best = times[counts == counts.max()]
+    start = float(best[int(np.argmin(np.abs(best + length_s / 2 - middle)))])
+    return Window(start, start + length_s, close=True) if counts.max() >= FEWEST else None
 
 
 def displacement_mm(trajectory: Trajectory, marker_id: int) -> tuple[Floats, Floats]:
@@ -102,7 +122,7 @@ def _row(
 
 def _fitted(row: Sequence[Axes], line: Line, data: tuple[Floats, Floats], window: Window) -> None:
     """The fitted line as a thin curve through the samples, where its frequency is known."""
-    if line.status not in TRUE_STATUSES or not np.isfinite(line.f_hz):
+    if line.status not in KNOWN or not np.isfinite(line.f_hz):
         return
     t_s, xyz = data
     inside = (t_s >= window.start_s) & (t_s <= window.end_s)

@@ -52,8 +52,9 @@ def scene(rig: StereoRig, trajectory: Trajectory | None, names: Mapping[int, str
                 _frustum(ax, how, camera, place, (side, 0.22 * far))
             if trajectory is not None:
                 _paths(ax, how, trajectory, names)
-            ax.set_aspect("equal", adjustable="datalim")
-            ax.margins(0.08)
+            _frame(ax, figure)
+            for side, _, place in _cameras(rig):
+                _name(ax, how, place, side)
         _triad(oblique, view)
         oblique.set_axis_off()
         oblique.set_title("seen from behind the cameras", loc="left")
@@ -100,8 +101,28 @@ def _frustum(
     ax.plot(axis[:, 0], axis[:, 1], color=colour, lw=0.5, ls=(0, (1, 3)))
     x, y = view.flat(centre[None])[0]
     ax.plot(x, y, "s", color=colour, ms=4.5, mew=0)
-    ax.annotate(f"{side} camera", (x, y), (0, -9), textcoords="offset points", ha="center",
-                va="top", fontsize=7, color=colour)  # fmt: skip
+
+
+def _frame(ax: Axes, figure: Figure) -> None:
+    """Equal scales on both axes and room for names around all that is drawn."""
+    width, height = figure.get_size_inches() * ax.get_position().size
+    (x0, y0), (x1, y1) = ax.dataLim.get_points()
+    scale = max((x1 - x0) / (width - 0.8), (y1 - y0) / (height - 0.6))  # mm an inch
+    x, y = (x0 + x1) / 2, (y0 + y1) / 2
+    ax.set_xlim(x - scale * width / 2, x + scale * width / 2)
+    ax.set_ylim(y - scale * height / 2, y + scale * height / 2)
+
+
+def _name(ax: Axes, view: _View, place: tuple[Floats, Floats], camera: str) -> None:
+    """The name of a camera behind it, inside the drawing."""
+    R, centre = place
+    here, ahead = view.flat(np.array([centre, centre + R[:, 2]]))
+    back = (here - ahead) / max(float(np.linalg.norm(here - ahead)), 1e-9)
+    share = (here[0] - ax.get_xlim()[0]) / np.ptp(ax.get_xlim())
+    anchor = "left" if share < 0.2 else "right" if share > 0.8 else "center"
+    ax.annotate(f"{camera} camera", here, (6 * back[0], 12 * back[1] - 4), fontsize=7,
+                color=canvas.LEFT if camera == "left" else canvas.RIGHT,
+                textcoords="offset points", ha=anchor, va="center")  # fmt: skip
 
 
 def _paths(ax: Axes, view: _View, trajectory: Trajectory, names: Mapping[int, str]) -> None:

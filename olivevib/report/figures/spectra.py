@@ -11,8 +11,9 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from olivevib.arrays import Floats
 from olivevib.report.figures import canvas
-from olivevib.report.words import measure, plain, unit_text
-from olivevib.vibration.types import Line, LineStatus, Spectrum
+from olivevib.report.lines import describe
+from olivevib.report.words import unit_text
+from olivevib.vibration import Line, Spectrum
 
 
 def noise_floor(f_hz: Floats, values: Floats, line_hz: float, resolution_hz: float) -> float:
@@ -30,19 +31,6 @@ def seen_at_hz(line: Line, nyquist_hz: float) -> float:
     rate = 2 * nyquist_hz
     folded = line.f_hz % rate
     return float(min(folded, rate - folded))
-
-
-def describe(line: Line) -> str:
-    """A line in words, never without its status: ``12.003 ± 0.002 Hz (direct)``."""
-    if line.status is LineStatus.NONE:
-        return "no line stands out of the noise"
-    if line.candidates_hz and line.status in (LineStatus.AMBIGUOUS, LineStatus.ALIASED):
-        listed = [plain(f, 2) for f in line.candidates_hz[:4]]
-        more = " …" if len(line.candidates_hz) > 4 else ""
-        return f"{line.status}: " + " or ".join(listed) + more + " Hz"
-    if not np.isfinite(line.f_hz):
-        return str(line.status)
-    return f"{measure(line.f_hz, 'Hz', line.f_sigma_hz)} ({line.status})"
 
 
 def amplitude_spectra(
