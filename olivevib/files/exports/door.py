@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 import difflib
+import importlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
 from olivevib.errors import UsageError
 from olivevib.files.atomic import as_input_error, replacing
-from olivevib.files.exports.csv_rows import write_csv
 from olivevib.files.exports.facts import ExportFacts, only_markers
-from olivevib.files.exports.txt_columns import write_txt
 from olivevib.reconstruction.trajectory import Trajectory
 
 Writer = Callable[[Trajectory, ExportFacts, BinaryIO], None]
 
 
-def _h5(trajectory: Trajectory, facts: ExportFacts, out: BinaryIO) -> None:
-    from olivevib.files.exports.hdf5 import write_h5
-
-    write_h5(trajectory, facts, out)
-
-
-WRITERS: dict[str, Writer] = {"csv": write_csv, "txt": write_txt, "h5": _h5}
-FORMATS: tuple[str, ...] = tuple(WRITERS)
+_MODULES = {
+    "csv": "csv_rows",
+    "txt": "txt_columns",
+    "h5": "hdf5",
+    "dxf": "dxf",
+    "step": "step",
+    "iges": "iges",
+    "ply": "ply",
+    "uff": "uff",
+    "c3d": "c3d",
+    "trc": "trc",
+    "mat": "mat",
+}
+FORMATS: tuple[str, ...] = tuple(_MODULES)
 
 
 def export(
@@ -49,8 +54,11 @@ def export(
 
 
 def _writer(to: str) -> Writer:
-    if to in WRITERS:
-        return WRITERS[to]
+    """``write_csv`` and so on; a format's module is loaded when it is asked for."""
+    if to in _MODULES:
+        module = importlib.import_module(f"olivevib.files.exports.{_MODULES[to]}")
+        writer: Writer = getattr(module, f"write_{to}")
+        return writer
     near = difflib.get_close_matches(to, FORMATS, n=1)
     raise UsageError(
         f"--to {to}: there is no such export format.",
