@@ -90,7 +90,8 @@ def fit_stamps(stamps_s: ArrayLike) -> StampFit:
     stamps_s: (N,) seconds, increasing, N >= 2. A stamp that comes late and is made up for is
     jitter; one after which all others stay late by 1, 2, … periods follows a drop of as many
     samples. Where stamps leave the line by a slow wave rather than by scatter (a variable frame
-    rate) the stamps are kept as times. A drop before the very last stamp cannot be told from a
+    rate) the stamps are kept as times; a wave no larger than the stamps' own rounding is none.
+    A drop before the very last stamp cannot be told from a
     late last stamp and counts as one. Source: knowledge of the field, timing model of
     CONVENTIONS.md (sampling time). Raises ValueError for fewer than two or for repeated stamps.
     """
@@ -101,7 +102,8 @@ def fit_stamps(stamps_s: ArrayLike) -> StampFit:
     sequence = _sequence(stamps)
     intercept, period, period_sigma = _line(sequence, stamps)
     residual = stamps - (intercept + period * sequence)
-    method = "stamps" if _varies(residual, period) else "line"
+    rounded = float(np.abs(residual).max()) < 0.75 * _resolution(stamps)
+    method = "stamps" if _varies(residual, period) and not rounded else "line"
     line = np.asarray(intercept + period * sequence, dtype=np.float64)
     return StampFit(
         sequence=sequence,
@@ -117,6 +119,7 @@ def fit_stamps(stamps_s: ArrayLike) -> StampFit:
 
 _EVEN_STEP = 0.4  # of a period: no step differs by more, so every step is one count
 _HEAD = 600  # stamps from which the period is chosen
+_WHOLE_STEP = 0.2  # of a period: all steps that near to whole periods, so they are counted as such
 _CHUNK, _MEMORY = 32, 96  # stamps counted at once; stamps behind that place the local clock
 _AS_GOOD = 1.2  # scatter up to that much above the least: then fewer drops are believed
 _NO_BEAT = 0.1  # least scatter, in periods, from which one drop cannot be told from jitter
@@ -134,6 +137,9 @@ def _sequence(stamps: Floats) -> Ints:
     median = float(np.median(steps))
     if (np.abs(steps / median - 1) < _EVEN_STEP).all():
         return np.arange(stamps.size, dtype=np.int64)
+    whole = np.maximum(1, np.rint(steps / median)).astype(np.int64)
+    if (np.abs(steps - whole * median) < _WHOLE_STEP * median).all():
+        return np.concatenate([[0], np.cumsum(whole)])
     head = stamps[:_HEAD]
     mean = float(steps[:_HEAD].mean())
     trials = [_beat(head, median), *(mean * (1 - 0.003 * np.arange(40)))]
@@ -237,6 +243,15 @@ def _line(sequence: Ints, stamps: Floats) -> tuple[float, float, float]:
     residual = stamps - intercept - slope * sequence
     freedom = max(1, stamps.size - 2)
     return intercept, slope, float(np.sqrt(np.sum(residual**2) / freedom / spread))
+
+
+def _resolution(stamps: Floats) -> float:
+    """The decimal place to which stamps were rounded, s; 0 where none coarser than 1 us shows."""
+    since = stamps - stamps[0]
+    for place in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
+        if (np.abs(since / place - np.rint(since / place)) < 1e-2).all():
+            return place
+    return 0.0
 
 
 def _varies(residual: Floats, period: float) -> bool:
