@@ -8,7 +8,7 @@ import numpy as np
 
 from olivevib.files.exports import export
 from olivevib.geometry import CameraModel, StereoRig
-from olivevib.reconstruction.trajectory import Trajectory
+from olivevib.reconstruction.trajectory import ContinuousFit, Trajectory
 from olivevib.signals import State
 from olivevib.vibration.types import Line, LineStatus, Spectrum
 
@@ -39,6 +39,22 @@ def make_trajectory(n: int = 50, ids: tuple[int, ...] = (7, 2, 31), seed: int = 
         epipolar_px=xyz[..., 0] / 1e3,
         frame="left camera",
         method="optimal",
+    )
+
+
+def make_fit(marker: int) -> ContinuousFit:
+    return ContinuousFit(
+        id=marker,
+        f_hz=25.0,
+        knots_s=np.arange(8.0),
+        sway=np.ones((6, 8)),
+        cosine=np.ones((2, 6)),
+        sine=np.zeros((2, 6)),
+        covariance=np.eye(25),
+        t_ref_s=1.0,
+        chi2=1.1,
+        candidates_hz=(5.0, 25.0),
+        evidence=(0.1, 0.9),
     )
 
 

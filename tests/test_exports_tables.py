@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from exports_scene import exported, make_rig, make_spectrum, make_trajectory
+from exports_scene import exported, make_fit, make_rig, make_spectrum, make_trajectory
 
 from olivevib.errors import InputError, UsageError
 from olivevib.files.exports import FORMATS, ExportFacts, export
@@ -52,7 +53,7 @@ def test_txt_blocks_end_at_gaps() -> None:
 
 @pytest.mark.parametrize("engine", ["h5netcdf"])
 def test_h5_opens_in_xarray_without_our_code(tmp_path: Path, engine: str) -> None:
-    trajectory = make_trajectory(n=400)
+    trajectory = replace(make_trajectory(n=400), fits=(make_fit(7),))
     facts = ExportFacts("T04", make_rig(), (make_spectrum((7, 2, 31)),))
     path = tmp_path / "new folder" / "a.h5"
     export(trajectory, "h5", path, facts)
@@ -69,6 +70,10 @@ def test_h5_opens_in_xarray_without_our_code(tmp_path: Path, engine: str) -> Non
         assert spectra["amplitude"].dims == ("f_hz", "marker", "axis")
         assert spectra["line_candidates_hz"].sel(marker=7).values.tolist() == [5.0, 25.0, 35.0]
         assert str(spectra["line_status"].values[0]) == "ambiguous"
+    with xr.open_dataset(path, engine=engine, group="continuous/marker_7") as fit:
+        assert fit["sway"].dims == ("component", "knot")
+        assert fit.attrs["f_hz"] == 25.0
+        assert fit["covariance"].shape == (25, 25)
     with xr.open_dataset(path, engine=engine, group="rig") as rig:
         assert rig["P_right"].values[0, 3] == pytest.approx(-420 * 900)
     assert [p.name for p in path.parent.iterdir()] == ["a.h5"]

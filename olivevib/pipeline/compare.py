@@ -36,7 +36,16 @@ def compare(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
 
 def import_options(sensor: Accelerometer) -> ImportOptions:
     """What trial.toml says of how to read a sensor's file."""
-    return ImportOptions(unit=sensor.unit, rate_hz=sensor.rate_hz, axes=sensor.axes)
+    return ImportOptions(
+        unit=sensor.unit,
+        per_g=sensor.per_g,
+        rate_hz=sensor.rate_hz,
+        time_column=sensor.time_column,
+        time_unit=sensor.time_unit,
+        columns=sensor.columns,
+        axes=sensor.axes,
+        start=sensor.start,
+    )
 
 
 def _one(

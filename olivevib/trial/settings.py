@@ -135,7 +135,12 @@ class Accelerometer(Section):
     axes: tuple[str, ...] = ()
     lever_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     unit: str | None = None
+    per_g: float | None = Positive
     rate_hz: float | None = Positive
+    columns: tuple[str, ...] = ()
+    time_column: str | None = None
+    time_unit: str | None = None
+    start: str | None = None
 
 
 class Vibration(Section):

@@ -37,7 +37,7 @@ def write_h5(trajectory: Trajectory, facts: ExportFacts, out: BinaryIO) -> None:
         if facts.rig is not None:
             _rig(file.create_group("rig", track_order=True), facts.rig)
         for spectrum in facts.spectra:
-            _spectrum(file.create_group(f"spectra/{spectrum.quantity}"), spectrum)
+            _spectrum(file.create_group(_spectrum_name(file, spectrum)), spectrum)
     out.write(buffer.getvalue())
 
 
@@ -114,9 +114,15 @@ def _covariance(group: Any, names: Dims, covariance: Floats | None) -> None:
     _put(group, "covariance", covariance, ("parameter", "parameter2"), "", "covariance")
 
 
+def _spectrum_name(file: Any, spectrum: Spectrum) -> str:
+    """spectra/QUANTITY; of a second phase spectra/QUANTITY_PHASE."""
+    name = f"spectra/{spectrum.quantity}"
+    return f"{name}_{spectrum.phase}" if name in file else name
+
+
 def _spectrum(group: Any, spectrum: Spectrum) -> None:
     unit = spectrum.unit
-    for name in ("quantity", "unit", "window", "resolution_hz", "enbw_bins"):
+    for name in ("quantity", "unit", "window", "resolution_hz", "enbw_bins", "phase"):
         group.attrs[name] = getattr(spectrum, name)
     _scale(group, "f_hz", spectrum.f_hz, "Hz", "frequency")
     _scale(group, "marker", spectrum.ids, "1", "marker id")
