@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import jinja2
 
-from olivevib.comparison import Comparison
 from olivevib.progress import Tick, silent
 from olivevib.report import tables
 from olivevib.report.clean import clean
@@ -92,7 +91,12 @@ def render_page(content: ReportContent, tick: Tick = silent) -> str:
         states=[s.word for s in State],
         state_rows=tables.state_rows(content),
         comparisons=[
-            (_words(c), tables.comparison_pairs(content, c), tables.comparison_lines(c))
+            (
+                str(c.verdict),
+                clean(c.reason),
+                tables.comparison_pairs(content, c),
+                tables.comparison_lines(c),
+            )
             for c in content.comparisons
         ],
         frame=clean(content.trajectory.frame) if content.trajectory else "",
@@ -149,11 +153,6 @@ def _reasons(content: ReportContent) -> list[tuple[str, str]]:
         )
         for why, ids in found.items()
     ]
-
-
-def _words(comparison: Comparison) -> str:
-    reason = clean(comparison.reason).rstrip(".")
-    return f"{clean(comparison.sensor, 60)} — {comparison.verdict}: {reason}."
 
 
 def _has(content: ReportContent, section: Section, figures: bool) -> bool:

@@ -20,6 +20,7 @@ QUANTITIES = (
     ("frequency_hz", "frequency of the dominant line where it is known, Hz"),
 )
 SURE = ("direct", "confirmed")
+MOST_GROUPS = 30  # rows of one box plot
 
 
 @dataclass(frozen=True)
@@ -58,11 +59,14 @@ FACTORS: tuple[tuple[str, Factor], ...] = (
 def render_season(entries: Sequence[SeasonEntry], tick: Tick = silent) -> str:
     """All trials as one HTML document; the table first, then the box plots."""
     template = environment().get_template("season.html.j2")
+    by_quantity: dict[str, list[Plate]] = defaultdict(list)
+    for plate in season_plates(entries, tick):
+        by_quantity[plate.section].append(plate)
     markers = sum(len(e.markers()) for e in entries)
     return template.render(
         name=f"{count(len(entries), 'trial')}, {count(markers, 'marker')}",
         rows=[season_row(e) for e in entries],
-        plates=season_plates(entries, tick),
+        plates=by_quantity,
         simulated=sum(e.simulated for e in entries),
         total=len(entries),
     )
@@ -70,7 +74,8 @@ def render_season(entries: Sequence[SeasonEntry], tick: Tick = silent) -> str:
 
 def season_row(entry: SeasonEntry) -> tuple[str, ...]:
     """One trial in the table: record, the marker that moves most, calibration, verdict."""
-    best = max(entry.markers(), key=_moved, default=None)
+    moving = [m for m in entry.markers() if entry.places.get(int(m["id"])) != "fixed"]
+    best = max(moving, key=_moved, default=None)
     calibration = entry.summary.get("calibration") or {}
     comparison = entry.summary.get("comparison") or {}
     line, moved, shaken = NOT_KNOWN, NOT_KNOWN, NOT_KNOWN
@@ -108,7 +113,7 @@ def season_plates(entries: Sequence[SeasonEntry], tick: Tick = silent) -> list[P
     for done, ((key, quantity), (factor, of)) in enumerate(jobs):
         tick(done, len(jobs), f"drawing: {quantity} by {factor}")
         groups = _groups(entries, key, of)
-        if len(groups) > 1:
+        if 1 < len(groups) <= MOST_GROUPS:
             svg = boxes(f"{key}-{factor.replace(' ', '')}", quantity, groups)
             out.append(Plate(quantity, svg, f"By {factor}: one dot a marker and trial."))
     tick(len(jobs), len(jobs), "figures drawn")

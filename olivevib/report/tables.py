@@ -13,7 +13,7 @@ from olivevib.geometry import CameraModel
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
 from olivevib.report.figures import Distance
-from olivevib.report.lines import MOST, candidates_text, describe
+from olivevib.report.lines import MOST, OPEN, candidates_text, describe
 from olivevib.report.words import NOT_KNOWN, fact, known, measure, number, percent, plain, seconds
 from olivevib.signals import State, fit_stamps
 from olivevib.vibration import Line, LineStatus
@@ -88,7 +88,7 @@ def marker_rows(content: ReportContent) -> list[MarkerRow]:
 
 def _candidates(listed: Sequence[float], line: Line | None) -> tuple[str, ...]:
     """The candidates one by one while they are few; none where the line is not to be seen."""
-    if line is not None and line.status in (LineStatus.BLIND, LineStatus.CHIRP):
+    if line is not None and line.status not in (*OPEN, LineStatus.SUPPORTED):
         return ()
     shares = line.probabilities if line is not None else ()
     if len(listed) > MOST:

@@ -30,15 +30,23 @@ def _seen(content: ReportContent) -> str:
     if path is None or not path.seen.any():
         return "No marker has been located in space yet."
     found = path.seen.any(axis=0)
-    share = float(np.median(path.seen[:, found].mean(axis=0)))
+    shares = path.seen[:, found].mean(axis=0)
     sigma = np.nanmedian(path.sigma_xyz_mm[path.seen], axis=0)
     known = triple(sigma, "mm")
     span = measure(path.t_s[-1] - path.t_s[0], "s", digits=3)
+    if shares.min() == 1:
+        often = "every one in every frame"
+    else:
+        often = (
+            f"a typical one in {percent(float(np.median(shares)))} of the frames,"
+            f" the worst in {percent(float(shares.min()))}"
+        )
+    were = "was" if found.sum() == 1 else "were"
     return (
-        f"{count(int(found.sum()), 'marker')} were located in space over {span}"
-        f" ({count(path.t_s.size, 'frame')}); half of them in at least {percent(share)} of the"
-        f" frames; a position is known to {known} ({AXES}, one standard deviation)."
-    ).replace("1\u00a0marker were", "1\u00a0marker was")
+        f"{count(int(found.sum()), 'marker')} {were} located in space over {span}"
+        f" ({count(path.t_s.size, 'frame')}), {often}; a position is known to {known}"
+        f" ({AXES}, one standard deviation)."
+    )
 
 
 def strongest(content: ReportContent) -> tuple[int, Line] | None:
@@ -76,6 +84,8 @@ def _vibration(content: ReportContent) -> str:
     others = [other.status for i, other in content.lines().items() if i != marker_id]
     same = sum(status is line.status for status in others)
     rest = f"; {same} of the {len(others)} others are {line.status} too" if others else ""
+    if others and same == len(others):
+        rest = f"; all others are {line.status} too"
     return f"Marker {name} moves most, {moves}, at {describe(line)}{rest}."
 
 

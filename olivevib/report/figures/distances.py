@@ -90,9 +90,11 @@ def distances(trajectory: Trajectory, pairs: Sequence[Distance], names: Mapping[
 
 
 def _round_up(value: float) -> float:
-    """The next of 1, 2, 5, 10, 20, … that is not below ``value``."""
+    """The next of 1, 1.5, 2, 3, 5, 7.5, 10, … that is not below ``value``."""
     decade = 10.0 ** np.floor(np.log10(value))
-    return float(min(s * decade for s in (1, 2, 5, 10) if s * decade >= value * 0.9999))
+    return float(
+        min(s * decade for s in (1, 1.5, 2, 3, 5, 7.5, 10) if s * decade >= value * 0.9999)
+    )
 
 
 def _map(ax: Axes, pairs: Sequence[Distance], ids: Sequence[int]) -> None:

@@ -46,7 +46,7 @@ def overlay(comparison: Comparison, part: int = 0) -> str:
                 each.grid(axis="y")
                 each.tick_params(labelbottom=k == 2)
                 each.locator_params(axis="y", nbins=4)
-        grid[0][0].set_title("displacement, 3 axes", loc="left")
+        grid[0][0].set_title("displacement at the camera's instants", loc="left")
         grid[0][1].set_title("camera less sensor, mm", loc="left")
         for ax in grid[2]:
             ax.set_xlabel("trial clock, s")
