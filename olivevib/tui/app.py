@@ -39,11 +39,8 @@ class OlivevibApp(App[None]):
     TITLE = "olivevib"
     CSS_PATH = "app.tcss"
     COMMANDS: ClassVar[set[type[Provider] | Callable[[], type[Provider]]]] = {OlivevibCommands}
-    HORIZONTAL_BREAKPOINTS: ClassVar[list[tuple[int, str]] | None] = [
-        (0, "-narrow"),
-        (100, "-wide"),
-    ]
-    VERTICAL_BREAKPOINTS: ClassVar[list[tuple[int, str]] | None] = [(0, "-low"), (30, "-high")]
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (100, "-wide")]  # noqa: RUF012 (as Textual has it)
+    VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # noqa: RUF012
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("j", "jump", "Jump to a pane", show=False),
         Binding("question_mark", "help", "Help", key_display="?"),
@@ -81,8 +78,6 @@ class OlivevibApp(App[None]):
         """The plot styles of the present theme."""
         return palette_of(self.current_theme)
 
-    # -- screens --------------------------------------------------------------------------------
-
     def open(self, folder: Path, page: str = "trial") -> None:
         """Show a page of a trial over the list of trials; the trial's own page stands below it."""
         while len(self.screen_stack) > 1:
@@ -119,8 +114,6 @@ class OlivevibApp(App[None]):
 
             self.push_screen(JumpScreen(regions), go)
 
-    # -- theme and what is kept -----------------------------------------------------------------
-
     def action_sunlight(self) -> None:
         """Change between the dark and the sunlight theme."""
         self.set_theme(DARK if self.theme == SUNLIGHT else SUNLIGHT)
@@ -140,8 +133,6 @@ class OlivevibApp(App[None]):
     @work(thread=True, group="kept")
     def _write_kept(self, kept: Kept) -> None:
         write_kept(self.workspace, kept)
-
-    # -- long work ------------------------------------------------------------------------------
 
     def start(self, job: Work) -> None:
         """Do long work in a thread; one at a time."""
@@ -183,12 +174,18 @@ class OlivevibApp(App[None]):
             words, warned = ended.result.words, bool(ended.result.cautions)
             severity: SeverityLevel = "warning" if warned else "information"
             self.notify(words, severity=severity, timeout=TOAST_S, markup=False)
+            if ended.result.opens is not None:
+                self.open(ended.result.opens)
 
     def action_cancel_work(self) -> None:
         """Ask the work to stop at its next step."""
         if self.progress is not None:
             self.cancelling = True
             self._cancel.set()
+
+    def on_unmount(self) -> None:
+        """However the app ends, its thread ends too, at the next safe place."""
+        self._cancel.set()
 
     async def action_quit(self) -> None:
         """Leave; work that runs is stopped first, and what it finished is kept."""

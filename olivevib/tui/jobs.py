@@ -58,7 +58,7 @@ def make_report(folder: Path) -> Work:
         from olivevib.trial import Trial
 
         page = next(iter(pipeline.report([Trial.open(folder)], None, tick)))
-        return Result(f"The report is {harmless(page)}", path=page)
+        return Result(f"The report is {harmless(page)}")
 
     return Work(f"{_name(folder)}: report", do)
 
@@ -74,22 +74,24 @@ def make_export(folder: Path, to: str) -> Work:
         target = pipeline.export_place(trial, to)
         tick(0, 1, f"writing {to}")
         pipeline.export(trial, to, target)
-        return Result(f"The export is {harmless(target)}", path=target)
+        return Result(f"The export is {harmless(target)}")
 
     return Work(f"{_name(folder)}: export {to}", do)
 
 
-def make_trial(folder: Path, plan: NewTrial) -> Work:
+def make_trial(workspace: Path, name: str, plan: NewTrial) -> Work:
     """A new trial from recordings; nothing is overwritten."""
 
     def do(tick: Tick) -> Result:
         from olivevib import pipeline
+        from olivevib.trial.workspace import make_workspace, place_for_new
 
-        trial = pipeline.new_trial(folder, plan, tick)
+        make_workspace(workspace)
+        trial = pipeline.new_trial(place_for_new(name, workspace), plan, tick)
         words = f"{harmless(trial.name)} is made. r runs every stage, s describes it."
-        return Result(words, path=trial.folder)
+        return Result(words, opens=trial.folder)
 
-    return Work(f"{_name(folder)}: copying recordings", do)
+    return Work(f"{harmless(name, 40)}: new trial", do)
 
 
 def make_demo(workspace: Path) -> Work:
@@ -97,11 +99,12 @@ def make_demo(workspace: Path) -> Work:
 
     def do(tick: Tick) -> Result:
         from olivevib.pipeline.simulated import simulated_trial
-        from olivevib.trial.workspace import make_workspace
+        from olivevib.trial.workspace import make_workspace, place_for_new
 
         make_workspace(workspace)
-        trial = simulated_trial(workspace / "trials" / DEMO, DEMO, 1, tick)
-        return Result("The simulated trial is made. Enter opens it, r runs it.", path=trial.folder)
+        trial = simulated_trial(place_for_new(DEMO, workspace), DEMO, 1, tick)
+        words = "A simulated trial is made; its truth stands beside it. r runs every stage."
+        return Result(words, opens=trial.folder)
 
     return Work("simulating a trial", do)
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from olivevib.comparison import Comparison
     from olivevib.reconstruction import Trajectory
     from olivevib.trial import Trial, TrialSettings
+    from olivevib.tui.views.setting_rows import SettingRow
     from olivevib.vibration import Vibration
 
 Value = TypeVar("Value")
@@ -162,3 +163,18 @@ def results(folder: Path) -> Results:
     return Results(
         folder, summary(trial), trial.trajectory, trial.vibration, trial.comparison, marked
     )
+
+
+def setting_values(folder: Path) -> tuple[SettingRow, ...]:
+    """Every setting of a trial as it would be typed."""
+    from olivevib.trial import Trial
+    from olivevib.tui.views.setting_rows import setting_rows
+
+    return setting_rows(Trial.open(folder).settings.model_dump(mode="json"))
+
+
+def change_trial(folder: Path, changes: Mapping[str, Any]) -> None:
+    """Write changed settings into trial.toml; raises UsageError, and then nothing is written."""
+    from olivevib.trial import Trial
+
+    Trial.open(folder).changed(changes)

@@ -18,11 +18,11 @@ KNOWN_AFTER_S = 1.0  # before that a rate is a guess
 
 @dataclass(frozen=True)
 class Result:
-    """What work left behind: a sentence with the next key, warnings, a file or a new trial."""
+    """What work left behind: a sentence with the next key, warnings, a trial to open."""
 
     words: str
     cautions: tuple[Caution, ...] = ()
-    path: Path | None = None
+    opens: Path | None = None
 
 
 @dataclass(frozen=True)

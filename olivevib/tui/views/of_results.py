@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from rich.text import Text
 
 from olivevib.arrays import Floats
 from olivevib.comparison import Comparison
@@ -13,6 +14,7 @@ from olivevib.reconstruction import Trajectory
 from olivevib.tui.harmless import harmless
 from olivevib.tui.views.motion import Band, MotionPlot
 from olivevib.tui.views.orbits import Orbit
+from olivevib.tui.views.palette import Palette
 from olivevib.tui.views.spectrum import Mark, SpectrumPlot, folded
 from olivevib.tui.views.words import DECIDED, frequency, short
 from olivevib.vibration import Line, LineStatus, Phase, Spectrum, Vibration
@@ -146,3 +148,16 @@ def comparison_of(comparison: Comparison, residual: bool) -> MotionPlot:
         return MotionPlot(f"{name} · camera − sensor", comparison.overlay_t_s, curves, "mm")
     curves = (("camera", camera), ("sensor", sensor))
     return MotionPlot(f"{name} · camera, over it the sensor", comparison.overlay_t_s, curves, "mm")
+
+
+def phases_text(vibration: Vibration | None, palette: Palette) -> Text:
+    """The phases with their limits, one line; what to do where there are none yet."""
+    if vibration is None:
+        return Text("Not analysed yet: Esc, then r runs every stage.", palette.muted)
+    out = Text()
+    for phase in vibration.phases:
+        style = palette.good if phase.name == vibration.spectrum_phase else palette.text
+        out.append(f"{phase.name} ", style)
+        limits = f"{phase.start_s:.2f}–{phase.end_s:.2f} s ({phase.duration_s:.2f} s)   "
+        out.append(limits, palette.muted)
+    return out

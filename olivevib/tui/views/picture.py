@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -29,14 +29,16 @@ class Window:
 
 @dataclass(frozen=True)
 class Outline:
-    """One marker in the image: id, corners_px (4, 2), the words beside it, and whether chosen."""
+    """One marker in the image: id, corners_px (4, 2), words beside it, trail_px (K, 2)."""
 
     id: int
     corners_px: Floats
     words: str
     chosen: bool = False
+    trail_px: Floats = field(default_factory=lambda: np.empty((0, 2)))
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "trail_px", floats("trail_px", self.trail_px, (None, 2)))
         object.__setattr__(self, "corners_px", floats("corners_px", self.corners_px, (4, 2)))
 
 
@@ -122,7 +124,8 @@ def _brackets(
     if x1 - x0 < 2 or y1 - y0 < 1:
         ends = {(x0, y0): "▪"}
     words = {(x0 + 1 + k, max(0, y0)): c for k, c in enumerate(outline.words)}
-    for at, char in {**ends, **words}.items():
+    trail = np.floor((outline.trail_px - corner) * scale).astype(np.int64).tolist()
+    for at, char in {**dict.fromkeys(trail, "·"), **ends, **words}.items():
         overlay[at] = (char, outline.chosen)
 
 

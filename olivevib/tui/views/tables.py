@@ -160,6 +160,15 @@ def comparison_text(c: Comparison, palette: Palette) -> Text:
     return out
 
 
+def not_compared_text(summary: Mapping[str, Any], palette: Palette) -> Text:
+    """Why there is no comparison, and what to do."""
+    stage = summary.get("stages", {}).get("compare", {})
+    out = Text("Not compared. ", palette.accent)
+    out.append(f"{harmless(stage.get('reason', 'reading …'), 300)}\n")
+    out.append("s binds an accelerometer file to a marker, r runs the stage.", palette.muted)
+    return out
+
+
 def _with_sigma(value: float, sigma: float, unit: str) -> str:
     if not np.isfinite(value):
         return "not known"

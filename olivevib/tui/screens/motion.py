@@ -1,0 +1,81 @@
+"""Displacement of one marker over time, with the phases of the trial."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import ClassVar
+
+from textual.binding import Binding, BindingType
+from textual.widgets import Static
+
+from olivevib.tui.harmless import harmless
+from olivevib.tui.loader import Results, results
+from olivevib.tui.screens.page import Command, Help
+from olivevib.tui.screens.time_page import TimePage
+from olivevib.tui.views.motion import MotionPlot
+from olivevib.tui.views.of_results import marker_name, motion_of, phases_text
+
+
+class MotionPage(TimePage):
+    """x, y and z of one marker on one scale."""
+
+    NAME = "motion"
+    HELP_TEXT = Help(
+        "Displacement of one marker from its mean, on the trial clock: t = 0 is the middle of "
+        "the left camera's first exposure. x is right, y down, z away from the left camera. Gaps "
+        "are gaps: there the marker was hidden, lost or outside. Above the curves stand the "
+        "phases that were found: rest, start-up, steady, shut-down, decay.",
+        "Noise at rest well below a tenth of the motion; a steady phase of 3 s or more.",
+    )
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("right_square_bracket", "marker(1)", "Next marker", key_display="]"),
+        Binding("left_square_bracket", "marker(-1)", "Marker before", key_display="["),
+    ]
+    _results: Results | None = None
+
+    def read(self) -> Results:
+        """Paths and phases from the files."""
+        return results(self.folder)
+
+    def show(self, value: object) -> None:
+        """Draw the marker that was looked at last."""
+        if isinstance(value, Results):
+            self._results = value
+            self.draw()
+            text = phases_text(value.vibration, self.olive.palette)
+            self.query_one("#numbers", Static).update(text)
+
+    @property
+    def _ids(self) -> list[int]:
+        path = self._results.trajectory if self._results else None
+        return [int(i) for i in path.ids] if path is not None else []
+
+    def plot(self) -> MotionPlot | None:
+        """The chosen marker's displacement."""
+        found, ids = self._results, self._ids
+        if found is None or found.trajectory is None or not ids:
+            return None
+        kept = self.olive.kept.marker
+        marker = kept if kept in ids else ids[0]
+        return motion_of(found.trajectory, found.vibration, marker, self._words_of(marker))
+
+    def _words_of(self, marker: int) -> str:
+        return marker_name(marker, self._results.places if self._results else {})
+
+    def commands(self) -> list[Command]:
+        """Every marker by name."""
+        return [
+            Command(f"Marker {harmless(self._words_of(i), 40)}", partial(self._choose, i))
+            for i in self._ids
+        ]
+
+    def _choose(self, marker: int) -> None:
+        self.olive.keep(marker=marker)
+        self.draw()
+
+    def action_marker(self, step: int) -> None:
+        """The next or previous marker."""
+        ids = self._ids
+        if ids:
+            at = ids.index(self.olive.kept.marker) if self.olive.kept.marker in ids else 0
+            self._choose(ids[(at + step) % len(ids)])
