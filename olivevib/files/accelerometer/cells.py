@@ -9,7 +9,8 @@ from functools import cached_property
 
 _BLANK = re.compile(r"(?i)\s*(nan|na|n/a|null|none|inf|-inf|#n/a|-|--|)\s*")
 STAMP = re.compile(
-    r"\s*(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})?[T ,_]*(\d{1,3}:\d{2}(:\d{2})?([.,:]\d+)?)?"
+    r"(?=.*\d[-/.:]\d)\s*(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})?"
+    r"[T ,_]*(\d{1,3}:\d{2}(:\d{2})?([.,:]\d+)?)?"
     r"\s*([AaPp]\.?[Mm]\.?)?\s*(Z|UTC|[+-]\d{2}:?\d{2})?\s*"
 )
 
@@ -41,7 +42,7 @@ class Dialect:
         if self.thousands:
             whole = rf"(?:\d{{1,3}}(?:{re.escape(self.thousands)}\d{{3}})+|\d+)"
         tail = rf"(?:{mark}\d*)?" if self.decimal == "." else rf"(?:{mark}\d+)?"
-        return re.compile(rf"\s*[+-]?(?:{whole}{tail}|{mark}\d+)(?:[eEdD][+-]?\d+)?\s*")
+        return re.compile(rf"\s*[+\-−]?(?:{whole}{tail}|{mark}\d+)(?:[eEdD][+-]?\d+)?\s*")
 
     def kinds(self, cells: list[str]) -> str:
         """One letter a cell: n number, s stamp, b blank or NaN, t other text."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from olivevib.errors import InputError, UsageError
+from olivevib.files.accelerometer.metadata import header_unit
 from olivevib.files.accelerometer.names import Meaning, meaning
 from olivevib.files.accelerometer.record import AXES, Channel, ImportOptions, Table
 from olivevib.files.accelerometer.units import ACCELERATION, TIME
@@ -118,6 +119,7 @@ def _axes(
     """The one set of axes: named acceleration before linear acceleration before bare letters."""
     free = [k for k in range(len(meanings)) if k not in times and table.channels[k].text is None]
     free = [k for k in free if np.isfinite(table.channels[k].values).any()]
+    _refuse_unreadable(table, meanings, times, source)
     for wanted in ({ACCELERATION}, {LINEAR}, {"unknown"}):
         fit = [k for k in free if meanings[k].quantity in wanted]
         lettered = [k for k in fit if meanings[k].axis]
@@ -127,14 +129,32 @@ def _axes(
         if fit and wanted != {"unknown"}:
             return _in_order(fit, meanings, source), True
     nameless = [k for k in free if not meanings[k].name]
-    if len(nameless) == len(free) and 1 <= len(free) <= 3:
-        return _in_order(free, meanings, source), True
+    if header_unit(table) is not None:  # the header block says that the channels accelerate
+        nameless = [k for k in free if meanings[k].quantity == "unknown" and not meanings[k].unit]
+    if 1 <= len(nameless) <= 3 and (len(nameless) == len(free) or header_unit(table)):
+        return _in_order(nameless, meanings, source), True
     raise InputError(
         f"{source} holds no acceleration.",
         "Its columns: " + "; ".join(f"{m.name or k} – {_reason(m)}" for k, m in _all(meanings)),
         "Choose the accelerometer's file; if a column is an acceleration after all, name the "
         "columns of x, y, z (columns) and their unit (unit).",
     )
+
+
+def _refuse_unreadable(
+    table: Table, meanings: tuple[Meaning, ...], times: tuple[int, ...], source: str
+) -> None:
+    """An axis whose cells are words must not silently be left out."""
+    for k, m in enumerate(meanings):
+        text = table.channels[k].text
+        if text is not None and k not in times and m.axis and m.quantity == ACCELERATION:
+            shown = next((str(c) for c in text if str(c).strip() not in ("", "nan")), None)
+            if shown is not None:
+                raise InputError(
+                    f"{source}: the column {m.name} cannot be read as numbers.",
+                    f"One of its cells is {shown[:40]!r}.",
+                    "Check the decimal mark, or name the columns of x, y, z (columns).",
+                )
 
 
 def _all(meanings: tuple[Meaning, ...]) -> list[tuple[str, Meaning]]:

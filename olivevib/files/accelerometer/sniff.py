@@ -142,7 +142,7 @@ def _layout(lines: list[str], encoding: str, dialect: Dialect, tail: list[str]) 
     kinds = _column_kinds([dialect.kinds(r) for r in rows if len(r) == width], width)
     first = _first_row(lines, dialect, kinds)
     above = lines[:first]
-    names, units, used = _header(above, dialect, width)
+    names, units, used = _header(above, dialect, width, len(kinds.rstrip("b")))
     metadata = _metadata([x for k, x in enumerate(above) if k not in used], dialect)
     metadata += tuple(("header mark", above[k].lstrip()[:1]) for k in sorted(used)[:1])
     marks = [x.lstrip()[0] for x in lines[first:] if x.lstrip().startswith(("#", ";", "%"))]
@@ -188,11 +188,14 @@ def _uncommented(line: str) -> str:
 
 
 def _header(
-    above: list[str], dialect: Dialect, width: int
+    above: list[str], dialect: Dialect, width: int, filled_width: int
 ) -> tuple[tuple[str, ...], tuple[str, ...], set[int]]:
     """Names and units of the columns from the lines above the data, and the lines they took."""
     filled = [k for k, line in enumerate(above) if line.strip()]
     rows = {k: _header_cells(above[k], dialect, width) for k in filled[-2:]}
+    if filled and rows[filled[-1]] is None and filled_width < width:  # a separator ends each row
+        short = {k: _header_cells(above[k], dialect, filled_width) for k in filled[-2:]}
+        rows = {k: cells and (*cells, *[""] * (width - filled_width)) for k, cells in short.items()}
     none = ("",) * width
     if not filled or rows[filled[-1]] is None:
         return none, none, set()

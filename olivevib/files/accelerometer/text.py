@@ -177,7 +177,7 @@ def _numbers(column: Any, layout: TextLayout) -> Floats:
     """A column with unreadable cells as numbers, NaN for these."""
     import pandas as pd
 
-    text = column.astype(str)
+    text = column.astype(str).str.replace("−", "-", regex=False)
     if layout.dialect.thousands:
         text = text.str.replace(layout.dialect.thousands, "", regex=False)
     if layout.dialect.decimal == ",":
