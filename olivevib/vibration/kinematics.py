@@ -10,6 +10,7 @@ from olivevib.signals import Samples
 from olivevib.vibration.clock import clock_of, measured
 from olivevib.vibration.figures import LineFigures
 from olivevib.vibration.line import LineFit
+from olivevib.vibration.sway import sway_basis
 from olivevib.vibration.types import Line
 
 QUANTITIES = ("displacement", "velocity", "acceleration")
@@ -47,8 +48,8 @@ def derive(found: LineFit, samples: Samples, derivative: int, top_hz: float) -> 
     if found.fit is not None:
         rest = rest - found.fit.motion(t_s)
         waves = waves + found.fit.motion(t_s, derivative)
-    if found.sway is not None:
-        slow, moved = _slow(t_s, rest, found.sway.shape[1], derivative)
+    if found.sway_hz > 0:
+        slow, moved = _slow(t_s, rest, found.sway_hz, derivative)
         rest, waves = rest - slow, waves + moved
     clock = clock_of(t_s)
     if clock.complete and clock.worst_periods < NEARLY_EVEN:
@@ -56,15 +57,14 @@ def derive(found: LineFit, samples: Samples, derivative: int, top_hz: float) -> 
     return waves if found.fit is not None else None
 
 
-def _slow(t_s: Floats, rest: Floats, count: int, derivative: int) -> tuple[Floats, Floats]:
-    """The sway in ``rest`` and its derivative, from cosines over the record (see sway.py)."""
-    span = float(t_s[-1] - t_s[0])
-    rates = np.pi * np.arange(count) / span
-    turn = np.outer(t_s - t_s[0], rates)
-    columns = np.cos(turn)
+def _slow(t_s: Floats, rest: Floats, limit_hz: float, derivative: int) -> tuple[Floats, Floats]:
+    """The sway in ``rest`` and its derivative (see sway.py)."""
+    basis = sway_basis(t_s, limit_hz)
+    if basis is None:
+        return np.zeros_like(rest), np.zeros_like(rest)
+    columns = basis.at(t_s)
     coefficients = np.linalg.lstsq(columns, rest, rcond=None)[0]
-    moved = np.cos(turn + derivative * np.pi / 2) * rates**derivative
-    return columns @ coefficients, moved @ coefficients
+    return columns @ coefficients, basis.at(t_s, derivative) @ coefficients
 
 
 def spectral_derivative(

@@ -20,6 +20,7 @@ from olivevib.vibration.verdict import Finding, SamplingFacts, fold, judge
 _FEWEST = 12  # samples below which nothing is called a line
 _APART = 1.5  # bins of 1/T that two waves must lie apart to be told apart safely
 _MOST = 0.5  # of the motion that a line must explain not to be asked about its speed
+_ROUNDING = 1e-9  # of the line: what is left below that is arithmetic, not motion
 _LOCAL = 16  # bins either side whose median is the local noise
 
 
@@ -46,11 +47,11 @@ class LineSettings:
 
 @dataclass(frozen=True)
 class LineFit:
-    """A line and the fit behind it (None: no line); ``sway`` (N, S): slow columns taken out."""
+    """A line and the fit behind it (None: no line); sway_hz: slower motion was fitted along."""
 
     line: Line
     fit: SineFit | None
-    sway: Floats | None
+    sway_hz: float = 0.0
 
 
 def dominant_line(
@@ -107,7 +108,7 @@ def _nothing(
         harmonics=np.empty((0, 3)),
         reasons=(reason,),
     )
-    return LineFit(line, None, None)
+    return LineFit(line, None)
 
 
 @dataclass(frozen=True)
@@ -175,6 +176,8 @@ class _Search:
         """The line with its harmonics, then with neighbours that stand out of what is left."""
         fit = self.with_harmonics(start_hz, (), sway)
         for _ in range(self.settings.neighbours):
+            if float(fit.noise.max()) < _ROUNDING * float(fit.amplitude.max()):
+                break
             lost = 0 if sway is None else sway.shape[1]
             left = scan(self.t_s, fit.residual, self.clock.rate_hz / 2, lost)
             allowed = left.f_hz > (self.facts.sway_hz if sway is not None else 0.0)
@@ -265,7 +268,8 @@ def _judged(search: _Search, fit: SineFit, sway: Floats | None, samples: Samples
     if abs(finding.candidates_hz[0] - fit.f_hz[0]) > search.bin_hz:
         fit = search.with_harmonics(finding.candidates_hz[0], tuple(fit.f_hz[1:]), sway)
         finding = _finding(search, fit, samples.unit)
-    return LineFit(_line(search, fit, sway, finding, samples.unit), fit, sway)
+    sway_hz = 0.0 if sway is None else search.facts.sway_hz
+    return LineFit(_line(search, fit, sway, finding, samples.unit), fit, sway_hz)
 
 
 def _finding(search: _Search, fit: SineFit, unit: str) -> Finding:

@@ -89,9 +89,9 @@ def scan(
 
 def _explained(since: Floats, centred: Floats, step: float, count: int) -> Floats:
     n = since.size
-    y = fourier_sums(since, centred, step, count)
     ones = np.ones((n, 1))
-    e1 = fourier_sums(since, ones, step, count)[:, 0]
+    both = fourier_sums(since, np.hstack([centred, ones]), step, count)
+    y, e1 = both[:, :-1], both[:, -1]
     e2 = fourier_sums(since, ones, 2 * step, count)[:, 0]
     c, s = e1.real, -e1.imag
     cc = (n + e2.real) / 2 - c * c / n

@@ -57,6 +57,8 @@ DEFAULTS = PhaseSettings()
 
 _CAMERA_WINDOW_S, _CAMERA_HOP_S = 1.0, 0.1
 _ONSET_WINDOW_S = 0.3
+_PLATEAU = 0.95  # of the median RMS while steady: the motion has reached its size
+_RAMP_S = 0.5  # a start-up or shut-down reaches at most so far into the steady frequency
 _SENSOR_WINDOW_S, _SENSOR_HOP_S = 0.3, 0.02
 _SENSOR_ONSET_S = 0.1
 _SENSOR_BAND_HZ = (3.0, 100.0)
@@ -152,6 +154,7 @@ def _phases(
     at_ends = ridge.t_s[steady.start] - start < ridge.window_s, end - last < ridge.window_s
     first = start if at_ends[0] and on == start else first
     last = end if at_ends[1] and off == end else last
+    first, last = _plateau(short, first, last, (first > start, last < end))
     decay, stop = _decay(ridge, last, off, fade, track.tolerance_hz)
     cuts = (start, on, first, last, decay, stop, end)
     return _named(cuts, ("rest", "start-up", "steady", "shut-down", "decay", "rest"))
@@ -205,6 +208,27 @@ def _steady(ridge: Ridge, on: Bools, tolerance_hz: float, settings: PhaseSetting
     if run is None or (run.stop - run.start) * ridge.hop_s < settings.shortest_s:
         return None
     return run
+
+
+def _plateau(
+    short: Ridge, first: float, last: float, movable: tuple[bool, bool]
+) -> tuple[float, float]:
+    """The steady limits drawn in to where the motion has reached its size, by at most _RAMP_S.
+
+    The frequency is steady before the amplitude is: a ramp left in the steady phase lowers the
+    amplitude of the line and shifts its frequency. Inside, a machine may beat as it likes.
+    """
+    inside = (short.t_s >= first) & (short.t_s <= last) & np.isfinite(short.rms)
+    if inside.sum() < 4 or last - first < 2 * _RAMP_S:
+        return first, last
+    full = np.flatnonzero(inside & (short.rms >= _PLATEAU * np.median(short.rms[inside])))
+    begin = float(short.t_s[full[0]]) + short.window_s / 4
+    finish = float(short.t_s[full[-1]]) - short.window_s / 4
+    if movable[0]:
+        first = min(max(first, begin), first + _RAMP_S)
+    if movable[1]:
+        last = max(min(last, finish), last - _RAMP_S)
+    return first, last
 
 
 def _decay(

@@ -9,7 +9,7 @@ from olivevib.arrays import Floats
 
 Complexes = NDArray[np.complex128]
 
-_DIRECT = 200_000  # products up to which the plain sum is the faster way
+_DIRECT = 20_000  # products up to which the plain sum is the faster way
 _WIDTH = 14  # grid cells a sample is spread over: relative error about 1e-12
 _BETA = 2.30 * _WIDTH
 
