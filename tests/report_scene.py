@@ -276,12 +276,15 @@ def summary(path: Trajectory, lines: tuple[Line, ...]) -> dict[str, Any]:
 
 
 def content(
-    ids: list[int] | None = None, status: LineStatus = LineStatus.DIRECT, **changes: Any
+    ids: list[int] | None = None,
+    status: LineStatus = LineStatus.DIRECT,
+    seconds: float = 10.0,
+    **changes: Any,
 ) -> ReportContent:
     """A whole trial whose first markers have ``status`` and whose last shows no line."""
     ids = ids or list(PLACES)
     f_hz = 12.003 if status is LineStatus.DIRECT else 5.0
-    path = trajectory(ids, f_hz=f_hz)
+    path = trajectory(ids, seconds, f_hz)
     statuses = [status] * (len(ids) - 1) + [LineStatus.NONE]
     spectra = spectrum(path, statuses, f_hz)
     values: dict[str, Any] = {

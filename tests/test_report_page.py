@@ -156,6 +156,7 @@ def test_hostile_text_is_shown_as_text_or_not_at_all():
     page = render_page(
         scene.content(
             [1, 2],
+            seconds=4.0,
             name=HOSTILE,
             places={1: HOSTILE, 2: long},
             record={"session": {"place": HOSTILE, "notes": long, HOSTILE: HOSTILE}},
@@ -197,7 +198,10 @@ def test_a_trial_with_only_a_rig_shows_the_rig():
 
 def test_tick_counts_the_figures_and_can_cancel():
     seen = []
-    render_page(scene.content([1, 17]), lambda done, total, note: seen.append((done, total, note)))
+    render_page(
+        scene.content([1, 17], seconds=4.0),
+        lambda done, total, note: seen.append((done, total, note)),
+    )
     assert [done for done, _, _ in seen] == list(range(len(seen)))
     assert seen[-1][0] == seen[-1][1]
 
@@ -208,11 +212,11 @@ def test_tick_counts_the_figures_and_can_cancel():
         raise Stop
 
     with pytest.raises(Stop):
-        render_page(scene.content([1, 17]), stop)
+        render_page(scene.content([1, 17], seconds=4.0), stop)
 
 
 def test_markers_never_seen_are_listed_but_not_drawn():
-    content = scene.content([1, 2, 3])
+    content = scene.content([1, 2, 3], seconds=4.0)
     path = content.trajectory
     xyz = path.xyz_mm.copy()
     xyz[:, 1] = np.nan

@@ -58,7 +58,7 @@ def make_trial(folder: Path) -> Trial:
     """A folder with every stage file of the made-up trial."""
     folder.mkdir(parents=True)
     (folder / "trial.toml").write_text(TOML, encoding="utf-8")
-    content = scene.content([1, 4, 17])
+    content = scene.content([1, 4, 17], seconds=5.0)
     now = Fingerprint({"left video": "ab" * 32}, {"fill": 0.7})
     caution = Caution("lag-unknown", "The lag is not known.", "Record the board waved.")
     path = content.trajectory
@@ -145,6 +145,8 @@ def test_season_links_only_to_pages_below_it(trial, tmp_path):
     assert "2 of 2 trials were computed" in Reader(text).visible.replace("\u00a0", " ")
 
 
-def test_a_missing_folder_is_told(trial, tmp_path):
+def test_a_missing_folder_is_told(tmp_path):
+    (tmp_path / "trial.toml").write_text("", encoding="utf-8")
+    trial = Trial.open(tmp_path)
     with pytest.raises(InputError, match="could not be written"):
         write_trial_report(trial, tmp_path / "nowhere" / "a.html")

@@ -54,7 +54,7 @@ def entry_of(trial: Trial, link: str = "") -> SeasonEntry:
         name=trial.name,
         record=_record(trial),
         summary=within(trial.folder, summary(trial)),
-        places=places_of(trial),
+        places={m.id: m.place for m in trial.settings.markers.marker if m.place},
         simulated=trial.settings.session.simulated,
         link=link,
     )

@@ -1,0 +1,31 @@
+"""The rows of the report's tables: text with units, made from frozen values and the summary."""
+
+from __future__ import annotations
+
+from olivevib.report.tables.comparison import comparison_lines, comparison_pairs
+from olivevib.report.tables.markers import (
+    candidate_accelerations,
+    distance_rows,
+    marker_rows,
+    phase_rows,
+    state_rows,
+)
+from olivevib.report.tables.record import provenance_pairs, record_sections, stage_rows
+from olivevib.report.tables.rig import camera_clocks, camera_columns, rig_pairs, timing_pairs
+
+__all__ = [
+    "camera_clocks",
+    "camera_columns",
+    "candidate_accelerations",
+    "comparison_lines",
+    "comparison_pairs",
+    "distance_rows",
+    "marker_rows",
+    "phase_rows",
+    "provenance_pairs",
+    "record_sections",
+    "rig_pairs",
+    "stage_rows",
+    "state_rows",
+    "timing_pairs",
+]
