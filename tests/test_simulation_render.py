@@ -14,6 +14,7 @@ from olivevib.geometry import CameraModel, apply_homography, rotation_from_vecto
 from olivevib.simulation import Body, Camera, Dapple, Leaf, Motion, Renderer, Surroundings
 from olivevib.simulation.render import reach
 from olivevib.simulation.scene import seen_at
+from olivevib.simulation.surroundings import covered_share
 
 SMALLEST_BOUND_PX = 0.0013  # Cramér-Rao, 96 px frontal marker, noise 2 DN (detection.md 7)
 
@@ -74,7 +75,7 @@ def test_centroid_of_a_still_marker_is_where_truth_puts_it(pose):
     assert np.abs(found - dark_centroid(body.planar, H)).max() < 5e-4  # demanded: 0.005 px
 
 
-def brute_force(cam, body, box, fine=40, coarse=8):
+def brute_force(cam, body, box, fine=32, coarse=8):
     """White and card by counting points: no code in common with the renderer but the lens."""
     x0, y0, x1, y1 = box
     pad = 5
@@ -218,6 +219,16 @@ def test_a_leaf_before_a_marker_covers_it_and_sways():
         true = camera().project([[30 * np.sin(6 * t), 0, 1200.0]])[0]
         assert np.abs(centre - true).max() < 0.6
         assert 100 < covered.sum() < 260  # pi a b = 119 px² and its soft rim
+
+
+def test_covered_share_is_the_leafs_area():
+    cam = camera(distortion=np.zeros(5))
+    leaf = Leaf(np.array([3.0, -2.0, 1200.0]), (12.0, 5.0), 0.6, 75.0)
+    steps = (np.arange(200) + 0.5) / 200 - 0.5
+    grid = 70 * np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    px = cam.project(marker(70, np.eye(3), (0, 0, 1400)).points_mm(0.0, grid)[0])
+    true = np.pi * 12 * 5 / 1200**2 / (70 / 1400) ** 2
+    assert covered_share((leaf, leaf), 0.0, cam.project, px) == pytest.approx(true, rel=0.01)
 
 
 def test_light_is_uneven_and_dapples_wander():

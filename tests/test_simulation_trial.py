@@ -27,6 +27,7 @@ from olivevib.simulation import (
 )
 from olivevib.simulation.recording import jpeg
 from olivevib.simulation.scenarios import BoardPlan, CameraPlan, Scenario
+from olivevib.simulation.truth import covered
 
 SMALL = CameraPlan(size_px=(640, 360), focal_px=475.0)
 
@@ -170,6 +171,15 @@ def test_lasting_keeps_the_shut_down_and_refuses_what_is_too_short():
         demo.lasting(2.0)
     with pytest.raises(UsageError, match="did you mean sample"):
         scenario("smaple")
+
+
+def test_truth_tells_what_leaves_hide():
+    stage = build(replace(scenario("leaves"), seconds=0.5), 1)
+    share = covered(stage, "left")
+    assert share.shape == (15, 8)
+    assert 0 < share.mean() < 0.3
+    assert np.ptp(share, axis=0).max() > 0.01  # they sway
+    assert not covered(build(scenario("demo").lasting(5.0), 1), "left").any()
 
 
 def detector(name):

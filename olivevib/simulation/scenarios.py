@@ -140,7 +140,7 @@ DEMO = Scenario(
     "demo",
     "eight markers on a shaken tree, 12 Hz, cameras in step, global shutter, 10 s",
     10.0,
-    Shaking(12.0, Phases(1.5, 0.9, 8.3, 0.4)),
+    Shaking(12.07, Phases(1.5, 0.9, 8.3, 0.4)),
     (5.0, 14.0),
     sensor=Sensor(marker=3),
 )
@@ -149,7 +149,7 @@ SAMPLE = Scenario(
     "sample",
     "six ArUco markers on a shaken tree, 12 Hz, cameras in step, global shutter, 3 s, small files",
     3.0,
-    Shaking(12.0, Phases(0.4, 0.35, 2.55, 0.2), sway_mm=0.6, decay_mm=2.0),
+    Shaking(12.07, Phases(0.4, 0.35, 2.55, 0.2), sway_mm=0.6, decay_mm=2.0),
     (5.0, 14.0),
     markers=MarkerPlan("aruco:DICT_4X4_50", (1, 2, 3, 4, 5, 6), (66.0, 74.0), (0.0, 35.0)),
     board=BoardPlan("charuco:7x5,square=50,marker=35,dict=DICT_5X5_50", 14, None, (800.0, 1250.0)),
@@ -203,7 +203,7 @@ DAPPLED = replace(
     name="dappled",
     title="the demo's tree under a moving crown: shadows wander over the markers, 6 s",
     seconds=6.0,
-    what=Shaking(12.0, Phases(0.8, 0.8, 4.8, 0.4)),
+    what=Shaking(12.07, Phases(0.8, 0.8, 4.8, 0.4)),
     light=LightPlan(gradient=0.25, dapple=Dapple()),
 )
 
@@ -212,7 +212,7 @@ LEAVES = replace(
     name="leaves",
     title="the demo's tree with leaves that sway before the markers and cover parts of them, 6 s",
     seconds=6.0,
-    what=Shaking(12.0, Phases(0.8, 0.8, 4.8, 0.4)),
+    what=Shaking(12.07, Phases(0.8, 0.8, 4.8, 0.4)),
     light=LightPlan(leaves=1800, front_leaves=2),
 )
 
@@ -221,7 +221,7 @@ ROUGH = replace(
     name="rough",
     title="the demo's tree through poor webcams: jitter, lost frames, gamma, strong MJPEG, 6 s",
     seconds=6.0,
-    what=Shaking(12.0, Phases(0.8, 0.8, 4.8, 0.4)),
+    what=Shaking(12.07, Phases(0.8, 0.8, 4.8, 0.4)),
     cameras=CameraPlan(
         optics=Optics(psf_px=0.9, read_noise_dn=2.5, shot_noise_dn=0.03, gamma=1.6),
         left=Clock(jitter_s=0.004, drop_fraction=0.05),

@@ -124,6 +124,35 @@ def _draw_limb(picture: Image, project: Project, limb: Limb) -> None:
     cv2.line(picture, a, b, limb.dn, thick)
 
 
+@dataclass(frozen=True)
+class Outline:
+    """The ellipse that a leaf fills in a picture: centre (2,), half axes and turn, px and rad."""
+
+    centre_px: Floats
+    a_px: float
+    b_px: float
+    turn_rad: float
+
+    def inward(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """1 - radius (positive inside) and its slope per px, at pixels x, y of any shape."""
+        x, y = x - self.centre_px[0], y - self.centre_px[1]
+        c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
+        u, v = (c * x + s * y) / self.a_px, (c * y - s * x) / self.b_px
+        radius = np.hypot(u, v)
+        return 1 - radius, np.hypot(u / self.a_px, v / self.b_px) / np.maximum(radius, 1e-9)
+
+
+def outline(leaf: Leaf, t_s: float, project: Project) -> Outline | None:
+    """Where a leaf is in a picture at time t; None: behind the camera."""
+    centre = leaf.centre_mm + leaf.motion(t_s)[0, :3]
+    spots = project(np.vstack([centre, centre + np.array([1.0, 0, 0])]))
+    if not np.isfinite(spots).all():
+        return None
+    scale = float(np.linalg.norm(spots[1] - spots[0]))
+    a, b = leaf.half_mm
+    return Outline(spots[0], a * scale, b * scale, leaf.turn_rad)
+
+
 def cover(leaf: Leaf, t_s: float, project: Project, psf_px: float) -> tuple[Floats, Image] | None:
     """How much a leaf covers at time t: corner (x, y) of a box and its alpha (h, w); None: unseen.
 
@@ -132,22 +161,25 @@ def cover(leaf: Leaf, t_s: float, project: Project, psf_px: float) -> tuple[Floa
     """
     from scipy.special import ndtr
 
-    centre = leaf.centre_mm + leaf.motion(t_s)[0, :3]
-    spots = project(np.vstack([centre, centre + np.array([1.0, 0, 0])]))
-    if not np.isfinite(spots).all():
+    found = outline(leaf, t_s, project)
+    if found is None:
         return None
-    scale = float(np.linalg.norm(spots[1] - spots[0]))
-    a, b = leaf.half_mm[0] * scale, leaf.half_mm[1] * scale
-    reach = int(np.ceil(a + 4 * psf_px)) + 1
-    corner = np.floor(spots[0]) - reach
-    x = np.arange(2 * reach + 1) + corner[0] - spots[0, 0]
-    y = (np.arange(2 * reach + 1) + corner[1] - spots[0, 1])[:, None]
-    c, s = np.cos(leaf.turn_rad), np.sin(leaf.turn_rad)
-    u, v = (c * x + s * y) / a, (c * y - s * x) / b
-    radius = np.hypot(u, v)
-    slope = np.hypot(u / a, v / b) / np.maximum(radius, 1e-9)
-    alpha = ndtr((1 - radius) / np.maximum(slope * psf_px, 1e-9))
+    reach = int(np.ceil(max(found.a_px, found.b_px) + 4 * psf_px)) + 1
+    corner = np.floor(found.centre_px) - reach
+    steps = np.arange(2 * reach + 1, dtype=np.float64)
+    inward, slope = found.inward(steps + corner[0], (steps + corner[1])[:, None])
+    alpha = ndtr(inward / np.maximum(slope * psf_px, 1e-9))
     return corner, alpha.astype(np.float32)
+
+
+def covered_share(leaves: tuple[Leaf, ...], t_s: float, project: Project, px: Floats) -> float:
+    """Share of the pixels (N, 2) that lie under a leaf at time t."""
+    hidden = np.zeros(len(px), dtype=np.bool_)
+    for leaf in leaves:
+        found = outline(leaf, t_s, project)
+        if found is not None:
+            hidden |= found.inward(px[:, 0], px[:, 1])[0] > 0
+    return float(hidden.mean()) if len(px) else 0.0
 
 
 def gradient_light(around: Surroundings, size_px: tuple[int, int]) -> Image | None:

@@ -15,8 +15,10 @@ from olivevib.simulation.motion import Shake
 from olivevib.simulation.planar import corners_mm
 from olivevib.simulation.scene import Camera, seen_at
 from olivevib.simulation.staging import STAMPS, Marker, Stage
+from olivevib.simulation.surroundings import covered_share
 
 PATH_HZ = 500.0  # of the dense paths in truth.h5
+COVER_GRID = 16  # points a side of a marker, to see what leaves hide
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,22 @@ def view_of(stage: Stage, side: str) -> View:
     return View(np.stack([f[0] for f in found], 1), np.stack([f[1] for f in found], 1))
 
 
+def covered(stage: Stage, side: str) -> Floats:
+    """Share of each marker's dark square that leaves hide from a camera, (N, M), 0…1."""
+    camera: Camera = getattr(stage.tree, side)
+    exposed, leaves = frames_of(stage, side).exposed_s, stage.tree.surroundings.front
+    out = np.zeros((exposed.size, len(stage.markers)))
+    if not leaves:
+        return out
+    steps = (np.arange(COVER_GRID) + 0.5) / COVER_GRID - 0.5
+    grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    for n, t in enumerate(exposed):
+        for m, marker in enumerate(stage.markers):
+            px = camera.project(marker.body.points_mm(t, grid * marker.size_mm)[0])
+            out[n, m] = covered_share(leaves, float(t), camera.project, px)
+    return out
+
+
 def write_truth(folder: Path, stage: Stage) -> tuple[Path, Path]:
     """Write truth.toml and truth.h5 into ``folder``; the same stage gives the same bytes."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -114,6 +132,7 @@ def _write_camera(group: Any, stage: Stage, side: str) -> None:
     _put(group, "centre_px", view.px[:, :, 0], "px")
     _put(group, "corners_px", view.px[:, :, 1:], "px")
     _put(group, "centre_t_s", view.t_s[:, :, 0], "s")
+    _put(group, "covered", covered(stage, side), "1")
 
 
 def _summary(stage: Stage) -> tomlkit.TOMLDocument:
