@@ -81,6 +81,7 @@ def test_recordings_hold_what_the_scenario_says_and_truth_lies_apart(tmp_path):
     assert made.board == "charuco:7x5,square=50,marker=35,dict=DICT_5X5_50"
     assert made.shutter == "global"
     assert made.row_time_us is None
+    assert made.exposure_ms == pytest.approx(2.0)
     assert set(made.sizes_mm) == set(made.ids) == {1, 2, 3, 4, 5, 6}
 
 

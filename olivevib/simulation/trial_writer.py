@@ -47,6 +47,7 @@ class SimulatedTrial:
     places: dict[int, str]
     shutter: str
     row_time_us: tuple[float, float] | None
+    exposure_ms: float
     band_hz: tuple[float, float] | None
     accelerometer: Path | None
     accelerometer_marker: int | None
@@ -200,6 +201,7 @@ def _told(
         places={m.id: m.place for m in stage.markers},
         shutter="rolling" if any(rows) else "global",
         row_time_us=(rows[0] * 1e6, rows[1] * 1e6) if any(rows) else None,
+        exposure_ms=scenario.cameras.optics.exposure_s * 1e3,
         band_hz=scenario.band_hz,
         accelerometer=accelerometer,
         accelerometer_marker=None if sensor is None else sensor.marker,
