@@ -6,7 +6,7 @@ import difflib
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import cv2
@@ -43,7 +43,7 @@ class Board:
     kind: str
     columns: int
     rows: int
-    lengths_mm: Mapping[str, float]
+    lengths_mm: Mapping[str, float] = field(hash=False)
     dictionary: str = ""
     inverted: bool = False
     legacy: bool = False

@@ -12,22 +12,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from olivevib.arrays import Bools, Floats, Ints
+from olivevib.calibration.tracks import polynomial
 from olivevib.geometry import LENS, CameraModel, rotation_from_vector, skew
 
+POSE = 7  # unknowns of one view: rotation, translation, jitter of the lag
 LEFT, RIGHT, RIGHT_ALONE = 0, 1, 2  # chain of an observation: which camera, through which pose
 THETA = tuple(f"left_{p}" for p in LENS) + tuple(f"right_{p}" for p in LENS) + (
     *("wx", "wy", "wz"),  # small rotation on the left of R_right_left, rad
     *("tx", "ty", "tz"),  # mm
     "lag",  # s
     *("bow_xx", "bow_xy", "bow_yy"),  # mm at half the board's width
+    *("left_row_time", "right_row_time"),  # s per sensor row
 )  # fmt: skip
 STEREO, LAG, BOW = slice(12, 18), 18, slice(19, 22)
-LENS_OF = (slice(0, 6), slice(6, 12))
+LENS_OF, ROW_OF = (slice(0, 6), slice(6, 12)), (22, 23)
 
 
 @dataclass(frozen=True)
 class State:
-    """One value of every unknown; R_pose (V, 3, 3), t_pose_mm (V, 3) are the board poses."""
+    """One value of every unknown; R_pose (V, 3, 3), t_pose_mm (V, 3) are the board poses.
+
+    jitter_s (V,): by how much the lag of a single view departs from ``lag_s`` (stamps of webcams
+    scatter by milliseconds); row_time_s (2,) of left and right.
+    """
 
     left: CameraModel
     right: CameraModel
@@ -37,9 +44,11 @@ class State:
     bow_mm: Floats
     R_pose: Floats
     t_pose_mm: Floats
+    jitter_s: Floats
+    row_time_s: Floats
 
     def moved(self, theta: Floats, pose: Floats) -> State:
-        """The state after a step: theta (22,), pose (V, 6) rotation and translation."""
+        """The state after a step: theta (24,), pose (V, 7) rotation, translation, jitter."""
         return State(
             self.left.with_lens(self.left.lens + theta[:6]),
             self.right.with_lens(self.right.lens + theta[6:12]),
@@ -48,7 +57,9 @@ class State:
             self.lag_s + float(theta[LAG]),
             self.bow_mm + theta[BOW],
             rotation_from_vector(pose[:, :3]) @ self.R_pose,
-            self.t_pose_mm + pose[:, 3:],
+            self.t_pose_mm + pose[:, 3:6],
+            self.jitter_s + pose[:, 6],
+            self.row_time_s + theta[list(ROW_OF)],
         )
 
 
@@ -57,8 +68,10 @@ class Observations:
     """All image points of the problem, sorted by chain (LEFT, RIGHT, RIGHT_ALONE).
 
     chain (N,), pose (N,) index of the board pose, ids (N,) of the points, board_mm (N, 3);
-    track (N, 4, 2): the image point as a cubic in the lag, px/s^k (stills: only the first row);
-    sigma_px (N,); centre_mm (2,) and half_mm scale the bow.
+    track (N, m, 2): the image point as a polynomial in time, px/s^k (stills: only the first row); for
+    RIGHT in the lag, else about the view's own instant; row (N,): sensor rows below the reference
+    row; row_time_s (2,): the row times with which the tracks were made; sigma_px (N,);
+    centre_mm (2,) and half_mm scale the bow.
     """
 
     chain: Ints
@@ -66,6 +79,8 @@ class Observations:
     ids: Ints
     board_mm: Floats
     track: Floats
+    row: Floats
+    row_time_s: Floats
     sigma_px: Floats
     centre_mm: Floats
     half_mm: float
@@ -75,11 +90,16 @@ class Observations:
         """Number of board poses."""
         return int(self.pose.max()) + 1 if self.pose.size else 0
 
-    def px(self, lag_s: float) -> tuple[Floats, Floats]:
-        """Image points (N, 2) at this lag and their velocity (N, 2) px/s."""
-        c = self.track
-        place = c[:, 0] + lag_s * (c[:, 1] + lag_s * (c[:, 2] + lag_s * c[:, 3]))
-        return place, c[:, 1] + lag_s * (2 * c[:, 2] + 3 * lag_s * c[:, 3])
+    @property
+    def camera(self) -> Ints:
+        """0 left, 1 right, for every observation (N,)."""
+        return (self.chain != LEFT).astype(np.int64)
+
+    def px(self, state: State) -> tuple[Floats, Floats]:
+        """Image points (N, 2) at lag and row times of the state, and their velocity (N, 2) px/s."""
+        lag = np.where(self.chain == RIGHT, state.lag_s + state.jitter_s[self.pose], 0.0)
+        late = self.row * (state.row_time_s - self.row_time_s)[self.camera]
+        return polynomial(self.track, lag - late)
 
     def bow_terms(self) -> Floats:
         """x^2, xy, y^2 of every point (N, 3), scaled by the half-width."""
@@ -95,6 +115,7 @@ class Observations:
             ids=self.ids[keep],
             board_mm=self.board_mm[keep],
             track=self.track[keep],
+            row=self.row[keep],
             sigma_px=self.sigma_px[keep],
         )
 
@@ -104,8 +125,8 @@ class Linear:
     """Residuals (N, 2) px, predicted minus observed, with derivatives by pose and by THETA."""
 
     residual: Floats
-    by_pose: Floats  # (N, 2, 6)
-    by_theta: Floats  # (N, 2, 22)
+    by_pose: Floats  # (N, 2, 7): rotation, translation, jitter
+    by_theta: Floats  # (N, 2, 24)
 
 
 def linearise(obs: Observations, state: State) -> Linear:
@@ -122,10 +143,15 @@ def linearise(obs: Observations, state: State) -> Linear:
         at = slice(*np.searchsorted(obs.chain, [chain, chain + 1]))
         if at.stop > at.start:
             predicted[at], by_point[at] = _through(chain, X[at], state, theta[at])
-    observed, velocity = obs.px(state.lag_s)
-    theta[:, :, LAG] = -velocity
+    observed, velocity = obs.px(state)
+    late = np.where(obs.chain == RIGHT, 1.0, 0.0)[:, None] * velocity
+    theta[:, :, LAG] = -late
+    for camera, column in enumerate(ROW_OF):
+        theta[:, :, column] = velocity * np.where(obs.camera == camera, obs.row, 0.0)[:, None]
     theta[:, :, BOW] = (by_point @ R[:, :, 2:]) * terms[:, None, :]
-    by_pose = np.concatenate([-by_point @ skew(turned), by_point], axis=2)
+    by_pose = np.concatenate(
+        [-by_point @ skew(turned), by_point, -late[:, :, None]], axis=2
+    )
     return Linear(predicted - observed, by_pose, theta)
 
 

@@ -5,22 +5,19 @@ Source: Zhang, A flexible new technique for camera calibration, 2000 (poses from
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from olivevib.arrays import Bools, Floats
-from olivevib.calibration.assemble import BoardShape, flatten
-from olivevib.calibration.bundle import LEFT, THETA, Observations, State, linearise
+from olivevib.arrays import Bools, Floats, Ints
+from olivevib.calibration.assemble import BoardShape, Side, flatten
+from olivevib.calibration.bundle import BOW, LEFT, ROW_OF, THETA, Observations, State, linearise
 from olivevib.calibration.settings import LensPrior
-from olivevib.calibration.solve import Prior, Problem, Solution, cost, grams, reduce, solve, step
-from olivevib.calibration.views import BoardView
+from olivevib.calibration.solve import Prior, Problem, Solution, solve
 from olivevib.geometry import CameraModel, homography, nearest_rotation
 
 FOCAL_STARTS = (0.65, 0.5, 0.9, 1.3)  # of the image width; webcams lie between
 START_VIEWS = 15  # views used to choose among the starts
-LENS_FREE = np.arange(len(THETA)) < 6
 EFFICIENCY = 2 * (1 - np.exp(-2.0))  # E min(e^2, k^2) of a 2-D normal norm e at k = 2
 
 
@@ -38,11 +35,15 @@ def lens_prior(prior: LensPrior, size_px: tuple[int, int], known: CameraModel | 
     return known.lens, np.linalg.inv(covariance)
 
 
-def mono_prior(prior: LensPrior, size_px: tuple[int, int], known: CameraModel | None) -> Prior:
+def mono_prior(
+    prior: LensPrior, side: Side, known: CameraModel | None, row_time_sd_s: float
+) -> Prior:
     """The prior of a problem with one camera, which stands in the left camera's place."""
     mean, precision = np.zeros(len(THETA)), np.zeros((len(THETA), len(THETA)))
-    mean[:6], precision[:6, :6] = lens_prior(prior, size_px, known)
-    precision[19:, 19:] = np.eye(3) / prior.bow_sd_mm**2
+    mean[:6], precision[:6, :6] = lens_prior(prior, side.camera.size_px, known)
+    precision[BOW, BOW] = np.eye(3) / prior.bow_sd_mm**2
+    if row_time_sd_s > 0:
+        precision[ROW_OF[0], ROW_OF[0]] = 1 / row_time_sd_s**2
     return Prior(mean, precision, prior.aspect_sd, aspect=(0,))
 
 
@@ -60,64 +61,58 @@ class LensFit:
         return self.solution.state.left
 
 
-def fit_lens(
-    views: Sequence[BoardView],
-    camera: CameraModel,
-    shape: BoardShape,
-    prior: Prior,
-) -> LensFit:
+def fit_lens(side: Side, shape: BoardShape, prior: Prior, huber: float = 2.0) -> LensFit:
     """Lens and board poses from one camera's views (at least 3), by robust least squares.
 
-    ``camera`` gives size and row time; its lens is only used where ``prior`` knows it already.
-    Several focal starts guard against false minima, both planar poses of every view are tried, and
-    the scale of the localiser's sigmas is estimated (Huber's proposal 2).
+    The lens of ``side.camera`` is only used where ``prior`` knows it already. Several focal starts
+    guard against false minima, both planar poses of every view are tried, and the scale of the
+    localiser's sigmas is estimated (Huber's proposal 2). Where ``prior`` holds a row time, it is
+    estimated too.
     """
-    obs = flatten(views, LEFT, range(len(views)), shape)
+    every = np.arange(len(side.views))
+    obs = flatten(side, every, LEFT, every, shape)
     unit = float(np.median(obs.sigma_px))
-    obs = replace(obs, sigma_px=obs.sigma_px / unit)  # 1 px to begin with
-    start = choose_start(views, camera, shape, prior)
-    state = posed(views, start, np.zeros(3))
-    scale = 1.0
-    free = LENS_FREE | (np.arange(len(THETA)) >= 19)
+    start = choose_start(side, shape, prior)
+    state = posed(side, every, start)
+    free = (np.arange(len(THETA)) < 6) | (np.diag(prior.precision) > 0)
+    scale = 1 / unit  # 1 px to begin with
     for _ in range(3):
-        problem = Problem(replace(obs, sigma_px=obs.sigma_px * scale), prior, free)
+        problem = Problem(replace(obs, sigma_px=obs.sigma_px * scale), prior, free, huber)
         solution = solve(problem, state)
         turned = better_poses(problem, solution.state)
         if turned is not None:
             solution = solve(problem, turned)
         state = solution.state
         scale *= scale_of(problem, solution)
-    return LensFit(solution, problem, scale / unit)
+    return LensFit(solution, problem, scale)
 
 
-def choose_start(
-    views: Sequence[BoardView], camera: CameraModel, shape: BoardShape, prior: Prior
-) -> CameraModel:
+def choose_start(side: Side, shape: BoardShape, prior: Prior) -> CameraModel:
     """The best of several focal lengths after a short fit of focal length, k1 and k2 alone."""
     known = prior.precision[0, 0] > 0
-    pick = np.unique(np.linspace(0, len(views) - 1, min(START_VIEWS, len(views))).round().astype(int))
-    some = [views[k] for k in pick]
-    obs = flatten(some, LEFT, range(len(some)), shape)
+    count = len(side.views)
+    some = np.unique(np.linspace(0, count - 1, min(START_VIEWS, count)).round().astype(np.int64))
+    obs = flatten(side, some, LEFT, np.arange(some.size), shape)
     obs = replace(obs, sigma_px=np.ones_like(obs.sigma_px))
     free = np.zeros(len(THETA), dtype=np.bool_)
     free[[0, 1, 4, 5]] = True
     tied = Problem(obs, replace(prior, aspect_sd=1e-5), free)
-    best: tuple[float, CameraModel] | None = None
-    for factor in (None,) if known else FOCAL_STARTS:
-        focal = factor * camera.size_px[0] if factor else 0.0
-        lens = np.array([focal, focal, *prior.mean[2:4], 0.0, 0.0]) if factor else prior.mean[:6]
-        solution = solve(tied, posed(some, camera.with_lens(lens), np.zeros(3)), 40)
-        if best is None or solution.cost < best[0]:
-            best = (solution.cost, solution.state.left)
-    assert best is not None  # FOCAL_STARTS is not empty
-    return best[1]
+    width = side.camera.size_px[0]
+    starts = [f * width for f in FOCAL_STARTS]
+    lenses = [np.array([f, f, *prior.mean[2:4], 0.0, 0.0]) for f in starts]
+    cameras = [side.camera.with_lens(lens) for lens in ([prior.mean[:6]] if known else lenses)]
+    fits = [solve(tied, posed(side, some, camera), 40) for camera in cameras]
+    return min(fits, key=lambda fit: fit.cost).state.left
 
 
-def posed(views: Sequence[BoardView], camera: CameraModel, bow: Floats) -> State:
+def posed(side: Side, pick: Ints, camera: CameraModel) -> State:
     """A state with each view's pose from the homography of its undistorted points."""
+    views = [side.views[k] for k in pick]
     poses = [planar_pose(view.board_mm, camera.ray(view.px)) for view in views]
     R, t = np.array([p[0] for p in poses]), np.array([p[1] for p in poses])
-    return State(camera, camera, np.eye(3), np.zeros(3), 0.0, bow, R, t)
+    row_time = np.array([side.row_time_s, 0.0])
+    none = np.zeros(3)
+    return State(camera, camera, np.eye(3), none, 0.0, none, R, t, np.zeros(len(R)), row_time)
 
 
 def planar_pose(board_mm: Floats, rays: Floats) -> tuple[Floats, Floats]:

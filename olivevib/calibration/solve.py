@@ -15,6 +15,8 @@ from olivevib.calibration.bundle import (
     BOW,
     LAG,
     LENS_OF,
+    POSE,
+    ROW_OF,
     STEREO,
     THETA,
     Observations,
@@ -32,7 +34,7 @@ STIFF = 1e12  # precision that holds a parameter, relative to its unit
 class Prior:
     """What is known of THETA before any image: Gaussian, and beta/alpha = 1 per camera.
 
-    mean (22,), precision (22, 22); aspect_sd is the sd of beta/alpha; aspect names the cameras
+    mean (24,), precision (24, 24); aspect_sd is the sd of beta/alpha; aspect names the cameras
     to which it applies (0 left, 1 right).
     """
 
@@ -42,7 +44,7 @@ class Prior:
     aspect: tuple[int, ...] = (0, 1)
 
     def at(self, state: State) -> tuple[float, Floats, Floats]:
-        """Half the squared distance, its gradient (22,) and Gauss-Newton matrix (22, 22)."""
+        """Half the squared distance, its gradient (24,) and Gauss-Newton matrix (24, 24)."""
         off = values(state) - self.mean
         gradient = self.precision @ off
         cost, matrix = 0.5 * float(off @ gradient), self.precision.copy()
@@ -59,22 +61,32 @@ class Prior:
 
 
 def values(state: State) -> Floats:
-    """THETA of a state (22,); the small rotation is zero by definition."""
+    """THETA of a state (24,); the small rotation is zero by definition."""
     out = np.zeros(len(THETA))
     out[LENS_OF[0]], out[LENS_OF[1]] = state.left.lens, state.right.lens
     out[STEREO][3:] = state.t_mm
     out[LAG], out[BOW] = state.lag_s, state.bow_mm
+    out[list(ROW_OF)] = state.row_time_s
     return out
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Observations, prior and which of THETA are unknown: ``free`` (22,)."""
+    """Observations, prior and which of THETA are unknown: ``free`` (24,).
+
+    jitter_sd_s: how far the lag of a single view may depart from the common one.
+    """
 
     observations: Observations
     prior: Prior
     free: Bools
     huber: float = 2.0
+    jitter_sd_s: float = 0.0
+
+    @property
+    def jitter_precision(self) -> float:
+        """Precision of a view's jitter, 1/s^2; no jitter is one within a nanosecond."""
+        return 1 / max(self.jitter_sd_s, 1e-9) ** 2
 
 
 @dataclass(frozen=True)
@@ -97,11 +109,12 @@ def cost(problem: Problem, state: State) -> float:
 
 def _cost(problem: Problem, state: State, residual: Floats) -> float:
     data = huber_cost(residual, problem.observations.sigma_px, problem.huber)
-    return data + problem.prior.at(state)[0]
+    jitter = 0.5 * problem.jitter_precision * float(state.jitter_s @ state.jitter_s)
+    return data + jitter + problem.prior.at(state)[0]
 
 
 def grams(problem: Problem, state: State) -> tuple[Floats, Floats]:
-    """Gram matrices (V, 7+p, 7+p) of [by pose, by free THETA, residual], and residuals (N, 2)."""
+    """Gram matrices (V, 8+p, 8+p) of [by pose, by free THETA, residual], and residuals (N, 2)."""
     obs = problem.observations
     linear = linearise(obs, state)
     scale = np.sqrt(huber_weights(linear.residual, obs.sigma_px, problem.huber)) / obs.sigma_px
@@ -114,7 +127,10 @@ def grams(problem: Problem, state: State) -> tuple[Floats, Floats]:
     padded = np.zeros((obs.poses, int(counts.max(initial=0)), 2, rows.shape[2]))
     padded[pose, slot] = rows[order]
     padded = padded.reshape(obs.poses, -1, rows.shape[2])
-    return padded.transpose(0, 2, 1) @ padded, linear.residual
+    gram = padded.transpose(0, 2, 1) @ padded
+    gram[:, 6, 6] += problem.jitter_precision
+    gram[:, 6, -1] += problem.jitter_precision * state.jitter_s
+    return gram, linear.residual
 
 
 @dataclass(frozen=True)
@@ -122,7 +138,7 @@ class Reduced:
     """The system of the free THETA after the poses are eliminated.
 
     H (V, p, p), g (V, p): information and gradient of each view; prior_H, prior_g the prior's;
-    pose (V, 6, p+1): what a view's pose does for a step of THETA (last column: its own step).
+    pose (V, 7, p+1): what a view's pose does for a step of THETA (last column: its own step).
     """
 
     H: Floats
@@ -147,10 +163,10 @@ class Reduced:
 
 def reduce(problem: Problem, state: State, gram: Floats, damping: float = 0.0) -> Reduced:
     """Eliminate each view's pose from its Gram matrix."""
-    U, W, C = gram[:, :6, :6], gram[:, :6, 6:], gram[:, 6:-1, 6:]
+    U, W, C = gram[:, :POSE, :POSE], gram[:, :POSE, POSE:], gram[:, POSE:-1, POSE:]
     diagonal = np.einsum("vii->vi", U)
-    floor = 1e-12 * diagonal.max(axis=1, keepdims=True) + 1e-12
-    U = U + np.eye(6) * (damping * diagonal + floor)[:, None, :]
+    floor = 1e-12 * diagonal[:, :6].max(axis=1, keepdims=True) + 1e-12
+    U = U + np.eye(POSE) * (damping * diagonal + floor)[:, None, :]
     solved = np.linalg.solve(U, W)
     left = C - W[:, :, :-1].transpose(0, 2, 1) @ solved
     _, gradient, matrix = problem.prior.at(state)
@@ -161,7 +177,7 @@ def reduce(problem: Problem, state: State, gram: Floats, damping: float = 0.0) -
 
 
 def step(problem: Problem, reduced: Reduced, damping: float) -> tuple[Floats, Floats, float]:
-    """The step of THETA (22,) and of the poses (V, 6), and its Newton decrement."""
+    """The step of THETA (24,) and of the poses (V, 7), and its Newton decrement."""
     H, g = reduced.total_H, reduced.total_g
     theta = np.zeros(len(THETA))
     if g.size:
