@@ -137,8 +137,9 @@ def _sequence(stamps: Floats) -> Ints:
     median = float(np.median(steps))
     if (np.abs(steps / median - 1) < _EVEN_STEP).all():
         return np.arange(stamps.size, dtype=np.int64)
-    whole = np.maximum(1, np.rint(steps / median)).astype(np.int64)
-    if (np.abs(steps - whole * median) < _WHOLE_STEP * median).all():
+    single = float(steps[steps < 1.5 * median].mean())
+    whole = np.maximum(1, np.rint(steps / single)).astype(np.int64)
+    if (np.abs(steps - whole * single) < _WHOLE_STEP * single).all():
         return np.concatenate([[0], np.cumsum(whole)])
     head = stamps[:_HEAD]
     mean = float(steps[:_HEAD].mean())

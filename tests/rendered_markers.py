@@ -41,8 +41,9 @@ class Canvas:
         s, n = self.look.samples, len(pattern)
         half = n / 2 + quiet
         card = apply_homography(H, [[-half, -half], [half, -half], [half, half], [-half, half]])
-        x0, y0 = np.floor(card.min(0) - 1).astype(int)
-        x1, y1 = np.ceil(card.max(0) + 2).astype(int)
+        margin = 1 + int(np.ceil(4 * self.look.psf_px))
+        x0, y0 = np.floor(card.min(0) - margin).astype(int)
+        x1, y1 = np.ceil(card.max(0) + margin + 1).astype(int)
         at = (np.arange(s) + 0.5) / s - 0.5
         xs = (np.arange(x0, x1)[:, None] + at).ravel()
         ys = (np.arange(y0, y1)[:, None] + at).ravel()
@@ -57,9 +58,8 @@ class Canvas:
         black = np.zeros(u.shape, bool)
         black[inside] = pattern[j[inside], i[inside]]
         shape = (y1 - y0, s, x1 - x0, s)
-        cover = on.reshape(shape).mean((1, 3))
         level = np.where(black, self.look.dark, self.look.white) * on
-        level = level.reshape(shape).mean((1, 3))
+        cover, level = (self._spread(fine).reshape(shape).mean((1, 3)) for fine in (on, level))
         a, b = max(y0, 0), min(y1, self.height)
         c, d = max(x0, 0), min(x1, self.width)
         cut = np.s_[a - y0 : b - y0, c - x0 : d - x0]
@@ -85,17 +85,17 @@ class Canvas:
             cv2.circle(
                 image, at, int(rng.integers(1, 5)), int(rng.uniform(150, 255)), -1, cv2.LINE_AA
             )
-        self.light = image.astype(np.float64)
+        self.light = cv2.GaussianBlur(image.astype(np.float64), (0, 0), max(self.look.psf_px, 0.1))
 
-    def blurred(self) -> np.ndarray:
+    def _spread(self, fine: np.ndarray) -> np.ndarray:
+        """The point spread, at the fine samples: on whole pixels it would alias."""
+        fine = fine.astype(np.float32)
         if self.look.psf_px <= 0:
-            return self.light
-        return cv2.GaussianBlur(
-            self.light, (0, 0), self.look.psf_px, borderType=cv2.BORDER_REPLICATE
-        )
+            return fine
+        return cv2.GaussianBlur(fine, (0, 0), self.look.psf_px * self.look.samples)
 
     def grey(self) -> np.ndarray:
-        noisy = self.blurred() + self.rng.normal(0, self.look.noise, self.light.shape)
+        noisy = self.light + self.rng.normal(0, self.look.noise, self.light.shape)
         return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
 
 

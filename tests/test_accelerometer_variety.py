@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from olivevib.errors import InputError
@@ -114,3 +115,20 @@ def test_an_axis_of_words_is_not_left_out_silently(tmp_path: Path) -> None:
     path.write_text("Time (s),X (g),Y (g),Z (g)\n" + text)
     with pytest.raises(InputError, match=r"X \(g\) cannot be read as numbers"):
         read_accelerometer(path)
+
+
+def test_a_bad_cell_late_in_a_long_file_spoils_nothing_else(tmp_path: Path) -> None:
+    count = 400_000  # several chunks of the reader
+    t_s = np.arange(count) / 4000
+    a = np.random.default_rng(3).normal(0, 4000, (count, 3)).round(1) + np.array([0, 0, 9806.0])
+    rows = pd.DataFrame({"t": t_s, "x": a[:, 0], "y": a[:, 1], "z": a[:, 2]})
+    path = tmp_path / "a.csv"
+    rows.to_csv(path, sep=";", decimal=",", header=False, index=False, float_format="%.5f")
+    lines = path.read_text().splitlines()
+    lines[350_000] = lines[350_000].rsplit(";", 1)[0] + ";ERR"
+    path.write_text("t (s);x (mm/s²);y (mm/s²);z (mm/s²)\n" + "\n".join(lines), encoding="utf-8")
+    record = read_accelerometer(path)
+    assert record.bad_cells == (("z (mm/s²)", 1),)
+    values = np.delete(record.samples.values, 350_000, axis=0)
+    np.testing.assert_allclose(values, np.delete(a, 350_000, axis=0) / 1000, rtol=0, atol=1e-6)
+    assert np.isnan(record.samples.values[350_000, 2])
