@@ -223,3 +223,9 @@ def test_markers_never_seen_are_listed_but_not_drawn():
     page = render_page(replace(content, trajectory=replace(path, xyz_mm=xyz)))
     assert Reader(page).open == []
     assert not re.search(r"\b(nan|None)\b", Reader(page).visible)
+
+
+@pytest.mark.slow
+def test_ten_minutes_of_twelve_markers_still_fit():
+    page = render_page(scene.content(list(range(1, 13)), seconds=600.0))
+    assert len(page.encode()) < 3_000_000

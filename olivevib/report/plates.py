@@ -200,7 +200,8 @@ _CLOSE = (
 )
 _ORBITS = (
     "Path about the mean position in three projections, all on one scale of ± {reach} mm."
-    " Dots: single frames. Thick: the ellipse of the dominant line."
+    " Dots: single frames, evenly"
+    " chosen in long records. Thick: the ellipse of the dominant line."
 )
 _DISTANCES = (
     "Distances between markers. On one rigid body they should not change: what remains there is"

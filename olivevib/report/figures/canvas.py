@@ -248,7 +248,7 @@ def column_heads(figure: Figure, grid: Sequence[Sequence[Axes]], heads: Sequence
                     fontsize=8, fontweight="bold")  # fmt: skip
 
 
-def thin(t: Floats, values: Floats, most: int = 1600) -> tuple[Floats, Floats]:
+def thin(t: Floats, values: Floats, most: int = 900) -> tuple[Floats, Floats]:
     """A long trace as the smallest and largest value of each of ``most``/2 stretches.
 
     What is drawn covers the same area; NaN stays a gap where a whole stretch is NaN.
@@ -265,6 +265,11 @@ def thin(t: Floats, values: Floats, most: int = 1600) -> tuple[Floats, Floats]:
         else:
             at += sorted((first + int(np.nanargmin(part)), first + int(np.nanargmax(part))))
     return t[at], values[at]
+
+
+def stride(n: int, most: int) -> int:
+    """Every how many of ``n`` samples to draw so that at most ``most`` are drawn."""
+    return max(1, -(-n // most))
 
 
 def runs(flags: Bools) -> list[tuple[int, int]]:

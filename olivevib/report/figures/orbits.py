@@ -16,6 +16,7 @@ from olivevib.report.figures.motion import displacement_mm
 from olivevib.vibration.types import Line
 
 PLANES = (("x", "y"), ("x", "z"), ("y", "z"))
+MOST = 600  # frames drawn of one marker
 MOST_ACROSS = 8  # markers side by side in one figure
 
 
@@ -74,7 +75,10 @@ def _panel(ax: Axes, xyz: Floats, plane: tuple[str, str], line: Line | None) -> 
     i, j = ("xyz".index(axis) for axis in plane)
     ax.axhline(0, color=canvas.GRID, lw=0.5)
     ax.axvline(0, color=canvas.GRID, lw=0.5)
-    ax.plot(xyz[:, i], xyz[:, j], color=canvas.SECOND, lw=0.4)
+    step = canvas.stride(len(xyz), MOST)
+    if step == 1:  # samples that follow each other
+        ax.plot(xyz[:, i], xyz[:, j], color=canvas.SECOND, lw=0.4)
+    xyz = xyz[::step]
     canvas.dots(ax, xyz[:, i], xyz[:, j], 1.3, canvas.LEFT)
     if line is not None and np.isfinite(line.amplitude).all():
         turn = np.linspace(0, 2 * np.pi, 73)

@@ -14,6 +14,8 @@ from olivevib.geometry import CameraModel, StereoRig
 from olivevib.reconstruction.trajectory import Trajectory
 from olivevib.report.figures import canvas
 
+MOST = 800  # samples drawn of one path
+
 
 @dataclass(frozen=True)
 class _View:
@@ -130,9 +132,10 @@ def _paths(ax: Axes, view: _View, trajectory: Trajectory, names: Mapping[int, st
         path = trajectory.xyz_mm[:, m]
         if not trajectory.seen[:, m].any():
             continue
-        flat = view.flat(path)
+        middle = view.flat(np.nanmean(path, axis=0)[None])[0]
+        flat = view.flat(path[:: canvas.stride(len(path), MOST)])
         ax.plot(flat[:, 0], flat[:, 1], color=canvas.MARK, lw=0.6)
-        x, y = np.nanmean(flat, axis=0)
+        x, y = middle
         ax.plot(x, y, "o", ms=3, mew=0.6, mfc="none", mec=canvas.INK)
         ax.annotate(str(int(marker_id)), (x, y), (3, 3), textcoords="offset points", fontsize=6.5)
 

@@ -15,6 +15,8 @@ from olivevib.report.lines import describe
 from olivevib.report.words import unit_text
 from olivevib.vibration import Line, Spectrum
 
+MOST = 700  # points of one curve
+
 
 def noise_floor(f_hz: Floats, values: Floats, line_hz: float, resolution_hz: float) -> float:
     """The median of a spectrum (F,) away from its line (and from zero): what noise alone gives."""
@@ -113,7 +115,7 @@ def _curve(
     """One spectrum (F,) with its noise floor and the upright of its line; returns where that is."""
     line, nyquist_hz = at
     shown = np.where(values > 0, values, np.nan)
-    ax.semilogy(spectrum.f_hz[1:], shown[1:], color=colour, lw=0.8)
+    ax.semilogy(*canvas.thin(spectrum.f_hz[1:], shown[1:], MOST), color=colour, lw=0.8)
     where = seen_at_hz(line, nyquist_hz)
     floor = noise_floor(spectrum.f_hz, values, where, spectrum.resolution_hz)
     if floor > 0 and spectrum.quantity == "displacement":  # elsewhere noise is not level
