@@ -118,7 +118,7 @@ def _axes(
 ) -> tuple[tuple[tuple[int, str], ...], bool]:
     """The one set of axes: named acceleration before linear acceleration before bare letters."""
     free = [k for k in range(len(meanings)) if k not in times and table.channels[k].text is None]
-    free = [k for k in free if np.isfinite(table.channels[k].values).any()]
+    free = [k for k in free if _holds_numbers(table.channels[k])]
     _refuse_unreadable(table, meanings, times, source)
     for wanted in ({ACCELERATION}, {LINEAR}, {"unknown"}):
         fit = [k for k in free if meanings[k].quantity in wanted]
@@ -139,6 +139,10 @@ def _axes(
         "Choose the accelerometer's file; if a column is an acceleration after all, name the "
         "columns of x, y, z (columns) and their unit (unit).",
     )
+
+
+def _holds_numbers(channel: Channel) -> bool:
+    return bool(np.isfinite(channel.values[:100]).any() or np.isfinite(channel.values).any())
 
 
 def _refuse_unreadable(

@@ -34,7 +34,7 @@ def interpret(table: Table, options: ImportOptions, source: str) -> Acceleromete
     raw = np.stack([_possible(table.channels[k].values) for k, _ in choice.axes]).T
     timing, more = _timing(table, choice, raw, options, source)
     raw = raw if timing.keep.all() else raw[timing.keep]
-    if not np.isfinite(raw).any():
+    if not any(np.isfinite(column).any() for column in raw.T):
         raise InputError(
             f"{source} has no readable acceleration.",
             "Every cell of " + ", ".join(_used(choice)) + " is empty or no number.",

@@ -16,23 +16,24 @@ def clipped(values: Floats) -> int:
     stand exactly on it, five times as many as in each of the next 2 % of the range (a sine has
     fewer on its very top than just below).
     """
-    good = values[np.isfinite(values)]
-    if good.size < 3 or good.max() == good.min():
+    low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))  # NaN left out
+    if values.size < 3 or not low < high:
         return 0
-    if (good[:1000] == np.rint(good[:1000])).all():
-        rails = int(np.isin(good, _RAILS).sum())
+    head = values[:1000][np.isfinite(values[:1000])]
+    if (head == np.rint(head)).all():
+        rails = sum(int((values == rail).sum()) for rail in _RAILS if rail in (low, high))
         if rails:
             return rails
-    return sum(_piled(side) for side in (good, -good))
+    return _piled(values, high) + _piled(-values, -low)
 
 
-def _piled(values: Floats) -> int:
-    top = float(values.max())
+def _piled(values: Floats, top: float) -> int:
     at_top = int((values == top).sum())
     if at_top < 5:
         return 0
-    middle = float(np.median(values))
-    upper = values[values > middle]
+    good = values[np.isfinite(values)]
+    middle = float(np.median(good))
+    upper = good[good > middle]
     if np.unique(upper).size < 10:  # a quiet, coarse signal: its levels are few and say nothing
         return 0
     near = int(((upper < top) & (upper > top - 0.1 * (top - middle))).sum())
@@ -41,7 +42,7 @@ def _piled(values: Floats) -> int:
 
 def stuck(values: Floats) -> bool:
     """True where an axis (N,) never changes."""
-    good = values[np.isfinite(values)]
+    good = values[np.isfinite(values)] if (values[:100] == values[:1]).all() else values[:2]
     return bool(good.size > 10 and good.max() == good.min())
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,6 +16,7 @@ from olivevib.files.accelerometer.encoding import find_encoding
 from olivevib.files.accelerometer.record import SEPARATORS, Channel, ImportOptions, Table
 from olivevib.files.accelerometer.sniff import SNIFF_BYTES, TextLayout, lines_of, sniff
 
+_LINE_FEED = 10
 _NEWLINE = re.compile(rb"\r\n|\n|\r")
 
 
@@ -104,22 +106,23 @@ def _read_frame(data: bytes, layout: TextLayout, source: str) -> tuple[Any, int]
     stream = io.BytesIO(body)
     stream.seek(start)
     try:
-        frame = pd.read_csv(
-            stream,
-            sep=r"\s+" if dialect.separator == " " else dialect.separator,
-            decimal=dialect.decimal,
-            thousands=dialect.thousands or None,
-            header=None,
-            names=list(range(len(layout.kinds))),
-            index_col=False,
-            comment=layout.comment or None,
-            encoding=encoding,
-            encoding_errors="replace",
-            on_bad_lines="skip",
-            skipinitialspace=layout.padded,
-            low_memory=False,
-            engine="c",
-        )
+        with warnings.catch_warnings():  # chunks of a column with bad cells differ in type
+            warnings.simplefilter("ignore", pd.errors.DtypeWarning)
+            frame = pd.read_csv(
+                stream,
+                sep=r"\s+" if dialect.separator == " " else dialect.separator,
+                decimal=dialect.decimal,
+                thousands=dialect.thousands or None,
+                header=None,
+                names=list(range(len(layout.kinds))),
+                index_col=False,
+                comment=layout.comment or None,
+                encoding=encoding,
+                encoding_errors="replace",
+                on_bad_lines="skip",
+                skipinitialspace=layout.padded,
+                engine="c",
+            )
     except (ValueError, pd.errors.ParserError, OverflowError, LookupError) as error:
         raise InputError(
             f"{source} cannot be read as {layout.words()}.",
@@ -144,7 +147,7 @@ def _body(data: bytes, layout: TextLayout) -> tuple[bytes, str, int]:
 
 def _skipped(body: bytes, start: int, layout: TextLayout, rows: int) -> int:
     """How many lines of cells are missing from ``rows``; blank and comment lines do not count."""
-    if body.count(b"\n", start) <= rows:
+    if np.count_nonzero(np.frombuffer(body, np.uint8, offset=start) == _LINE_FEED) <= rows:
         return 0
     lines = body[start:].split(b"\n")
     mark = layout.comment.encode() or b"\0"
@@ -174,13 +177,19 @@ def _channels(frame: Any, layout: TextLayout) -> Iterator[Channel]:
 
 
 def _numbers(column: Any, layout: TextLayout) -> Floats:
-    """A column with unreadable cells as numbers, NaN for these."""
+    """A column with unreadable cells as numbers, NaN for these.
+
+    The reader has turned some chunks of it into numbers already; only words are turned here.
+    """
     import pandas as pd
 
-    text = column.astype(str).str.replace("−", "-", regex=False)
+    words = column.map(lambda cell: isinstance(cell, str)).to_numpy(dtype=np.bool_)
+    text = column[words].astype(str).str.replace("−", "-", regex=False)
     if layout.dialect.thousands:
         text = text.str.replace(layout.dialect.thousands, "", regex=False)
     if layout.dialect.decimal == ",":
         text = text.str.replace(",", ".", regex=False)
-    values = pd.to_numeric(text, errors="coerce").to_numpy(dtype=np.float64)
+    values = np.full(len(column), np.nan)
+    values[words] = pd.to_numeric(text, errors="coerce").to_numpy(dtype=np.float64)
+    values[~words] = column[~words].to_numpy(dtype=np.float64)
     return np.asarray(np.where(np.isinf(values), np.nan, values))
