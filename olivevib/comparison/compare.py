@@ -10,13 +10,13 @@ from olivevib.arrays import Floats
 from olivevib.comparison.fit import ClockFit, Seen, fit_clock
 from olivevib.comparison.forward import Nuisance, SensorMotion, nuisance, sensor_motion
 from olivevib.comparison.lag import CoarseLag, envelope_offset, fine_lag, offsets_that_overlap
-from olivevib.comparison.lines import line_differences, sensor_lines, sensor_part
+from olivevib.comparison.lines import line_differences, sensor_lines, steady_limits
 from olivevib.comparison.settings import DEFAULTS, ComparisonSettings
 from olivevib.comparison.types import Comparison, LineDifference, Verdict
 from olivevib.geometry import vector_from_rotation
 from olivevib.progress import Tick, silent
 from olivevib.signals import Samples
-from olivevib.vibration.clock import measured
+from olivevib.vibration.clock import between, measured
 from olivevib.vibration.line import LineFit
 from olivevib.vibration.verdict import fold
 
@@ -25,9 +25,10 @@ _NARROWEST_HZ = 0.3
 _RESEMBLES = 0.8  # correlation below which the two motions are not called the same
 _CLOSE = 0.05  # a rival lag whose correlation comes that near is told
 _DECISIVE = 25.0  # chi-square by which the best lag must beat the rival to be sure
-_OPEN_DEG = 20.0
+_OPEN_DEG = 8.0  # sigma of the turn from which what is seen across may be noise
+_OPEN_RAD = 1.0  # sigma of a turn that nothing fixes
 _LEAST_LEFT = 0.005  # of the motion's power that taking out the slow part must leave
-_NO_COLUMNS = Nuisance(np.empty((0, 0)))
+_NO_COLUMNS = Nuisance(np.empty((0, 0)), 0.0)
 
 
 def compare(
@@ -65,9 +66,7 @@ def compare(
     seen, clock = work.refined(lag.offset_s)
     if seen.t_s.size < _FEWEST:
         return empty.undecided("Too few frames lie inside the accelerometer's record.")
-    part = sensor_lines(sensor_part(sensor, seen.t_s, clock.offset_s), 1.5 * settings.corner_hz)
-    differences = line_differences(seen, motion, clock, part)
-    return _comparison(empty, work, lag, seen, clock, differences)
+    return _comparison(empty, work, lag, seen, clock, work.differences(sensor, clock))
 
 
 @dataclass(frozen=True)
@@ -127,15 +126,30 @@ class _Work:
         seen = Seen(self.camera_s, slow.out(self.camera_mm), slow, s.exposure_s)
         return fine_lag(seen, self.motion, offsets, self.apart_s, level)
 
-    def refined(self, offset_s: float) -> tuple[Seen, ClockFit]:
-        """Gauss-Newton from a coarse lag, on the frames that the sensor covers."""
+    def differences(self, sensor: Samples, clock: ClockFit) -> tuple[LineDifference, ...]:
+        """Line by line over the steady phase, or over all that both saw."""
+        start, end = steady_limits(sensor, self.camera_s, clock.offset_s)
+        seen = self.seen(clock.offset_s, start, end)
+        if seen.t_s.size < _FEWEST:
+            return ()
+        part = between(sensor, start + clock.offset_s, end + clock.offset_s)
+        lines = sensor_lines(part, 1.5 * self.settings.corner_hz)
+        return line_differences(seen, self.motion, clock, lines)
+
+    def seen(self, offset_s: float, start_s: float = -np.inf, end_s: float = np.inf) -> Seen:
+        """What the camera saw from start to end while the sensor's record is usable."""
         margin = 2 * self.settings.fine_step_s
         q = self.camera_s + offset_s
         good = self.motion.usable(q, self.settings.exposure_s + margin)
+        good &= (self.camera_s >= start_s) & (self.camera_s <= end_s)
         t_s = self.camera_s[good]
         slow = nuisance(t_s, self.slow_hz(offset_s)) if t_s.size > 1 else _NO_COLUMNS
-        seen = Seen(t_s, slow.out(self.camera_mm[good]), slow, self.settings.exposure_s)
-        if t_s.size < _FEWEST:
+        return Seen(t_s, slow.out(self.camera_mm[good]), slow, self.settings.exposure_s)
+
+    def refined(self, offset_s: float) -> tuple[Seen, ClockFit]:
+        """Gauss-Newton from a coarse lag, on the frames that the sensor covers."""
+        seen = self.seen(offset_s)
+        if seen.t_s.size < _FEWEST:
             return seen, _no_clock()
         return seen, fit_clock(seen, self.motion, offset_s)
 
@@ -235,7 +249,8 @@ def _comparison(
     rival = _rival(work, lag, clock)
     sigma = clock.sigma
     offset_sigma = float(np.hypot(sigma[0], 0.0 if rival.excluded else rival.scatter_s))
-    worst_deg = float(np.degrees(clock.turn_sigma_rad))
+    straight = _is_straight(seen.mm, clock)
+    worst_deg = float(np.degrees(_OPEN_RAD if straight else clock.turn_sigma_rad))
     angle = float(np.degrees(np.linalg.norm(vector_from_rotation(clock.R_camera_sensor))))
     coherence = _coherence(seen.mm, clock.residual_mm)
     verdict, reason = _verdict(work, lag, clock, coherence)
@@ -262,6 +277,19 @@ def _comparison(
         verdict=verdict,
         reason=" ".join(reasons),
     )
+
+
+def _is_straight(optical: Floats, clock: ClockFit) -> bool:
+    """True where the motion across its main direction is not the sensor's own: no turn from it.
+
+    What the sensor predicts across may be its noise alone; the camera then sees none of it. Taken
+    as real where the camera sees at least half of it.
+    """
+    main = np.linalg.eigh(clock.predicted_mm.T @ clock.predicted_mm)[1][:, -1]
+    across = clock.predicted_mm - np.outer(clock.predicted_mm @ main, main)
+    size = float(np.sum(across**2))
+    seen = float(np.sum(across * optical)) / size if size > 0 else 0.0
+    return seen < 0.5 * clock.gain
 
 
 def _coherence(optical: Floats, residual: Floats) -> float:

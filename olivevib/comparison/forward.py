@@ -20,7 +20,9 @@ from olivevib.vibration.kinematics import to_displacement
 from olivevib.vibration.sway import sway_columns
 
 _DENSE_HZ = 1000.0  # the spline's own rate: 40 samples in a cycle of 25 Hz
-_GAP_PERIODS = 2.5  # a longer step between samples is a gap
+_GAP_PERIODS, _GAP_S = 2.5, 0.006  # a step longer than both is a gap: no spline bridges it
+_GAP_FADES = 3.0  # corner periods after which what a bridged gap upsets has died away
+_MOST_SLOW = 0.6  # of the frames that the slow part may take
 _EVEN_PERIODS = 0.02
 
 
@@ -80,8 +82,9 @@ def sensor_motion(sensor: Samples, corner_hz: float) -> SensorMotion:
     spline = CubicSpline(fine_t, displacement)
     margin = 1.0 / corner_hz
     steps = np.diff(t_s)
-    at = np.flatnonzero(steps > _GAP_PERIODS * np.median(steps))
-    gaps = np.stack([t_s[at] - margin / 2, t_s[at + 1] + margin / 2], axis=1)
+    at = np.flatnonzero(steps > max(_GAP_PERIODS * float(np.median(steps)), _GAP_S))
+    upset = _GAP_FADES * margin
+    gaps = np.stack([t_s[at] - upset, t_s[at + 1] + upset], axis=1)
     return SensorMotion(
         start_s=float(t_s[0]) + margin,
         end_s=float(t_s[-1]) - margin,
@@ -109,9 +112,13 @@ def even_acceleration(t_s: Floats, a: Floats) -> tuple[Floats, Floats, bool]:
 
 @dataclass(frozen=True)
 class Nuisance:
-    """Orthonormal slow columns that are taken out of prediction and camera alike."""
+    """Orthonormal slow columns (N, K) that are taken out of prediction and camera alike.
 
-    columns: Floats  # (N, K)
+    limit_hz: they span motion slower than that; 0 where only the mean is taken out.
+    """
+
+    columns: Floats
+    limit_hz: float
 
     @property
     def count(self) -> int:
@@ -125,7 +132,7 @@ class Nuisance:
 
 def nuisance(t_s: Floats, limit_hz: float) -> Nuisance:
     """The slow columns below limit_hz on camera times t_s; at least the constant."""
-    columns = sway_columns(t_s, limit_hz)
+    columns = sway_columns(t_s, limit_hz, _MOST_SLOW)
     if columns is None:
-        columns = np.full((t_s.size, 1), 1.0 / np.sqrt(t_s.size))
-    return Nuisance(columns)
+        return Nuisance(np.full((t_s.size, 1), 1.0 / np.sqrt(t_s.size)), 0.0)
+    return Nuisance(columns, limit_hz)

@@ -11,6 +11,7 @@ from olivevib.comparison.types import LineDifference
 from olivevib.signals import Samples
 from olivevib.vibration.clock import between, measured
 from olivevib.vibration.line import LineFit, LineSettings, fit_line
+from olivevib.vibration.phases import find_sensor_phases
 from olivevib.vibration.verdict import SamplingFacts, fold
 
 _BLOCK_HZ = 400.0  # a sensor is averaged down to about this rate before its lines are looked for
@@ -39,7 +40,8 @@ def line_differences(
     """Complex amplitude of each line in both, on the camera's times, as peak resultants in m/s2.
 
     Both carry the exposure's mean, which is divided out again. Lines that fold onto one another
-    or onto the slow motion at the camera's rate are left out.
+    or onto the slow motion at the camera's rate are left out. ``seen`` may be a part of what the
+    clock was fitted to (the steady phase).
     """
     if lines.fit is None:
         return ()
@@ -48,7 +50,10 @@ def line_differences(
         return ()
     basis = _basis(seen, frequencies)
     optical, covariance = _complex(basis, seen.mm)
-    sensor, _ = _complex(basis, clock.predicted_mm)
+    since = seen.t_s - clock.t_ref_s
+    q = seen.t_s + clock.offset_s + clock.drift * since
+    predicted = seen.slow.out(motion.seen(q, seen.exposure_s)) @ clock.R_camera_sensor.T
+    sensor, _ = _complex(basis, predicted)
     out = []
     for j, f in enumerate(frequencies):
         to_m_s2 = float((2 * np.pi * f) ** 2 * 1e-3 / np.sinc(f * seen.exposure_s))
@@ -73,7 +78,7 @@ def _separable(seen: Seen, frequencies: Floats) -> Floats:
     """The frequencies that stay apart at the camera's rate, strongest first as given."""
     span = float(seen.t_s[-1] - seen.t_s[0])
     rate = (seen.t_s.size - 1) / span
-    slow = seen.slow.count / (2 * span) + 1 / span
+    slow = seen.slow.limit_hz + 0.5 / span
     kept: list[float] = []
     folded: list[float] = []
     for f in frequencies:
@@ -115,6 +120,14 @@ def _sensor_sigma(lines: LineFit, j: int, frequencies: Floats) -> float:
     return float(np.sqrt(np.sum(share * lines.fit.amplitude_sigma[at] ** 2)))
 
 
-def sensor_part(sensor: Samples, camera_s: Floats, offset_s: float) -> Samples:
-    """The sensor's samples while the camera looked."""
-    return between(sensor, float(camera_s[0]) + offset_s, float(camera_s[-1]) + offset_s)
+def steady_limits(sensor: Samples, camera_s: Floats, offset_s: float) -> tuple[float, float]:
+    """From when to when, on the trial clock, the sensor ran steadily while the camera looked.
+
+    All that both saw where no steady phase is found.
+    """
+    start, end = float(camera_s[0]), float(camera_s[-1])
+    part = between(sensor, start + offset_s, end + offset_s)
+    steady = [p for p in find_sensor_phases(part) if p.name == "steady"]
+    if not steady:
+        return start, end
+    return max(start, steady[0].start_s - offset_s), min(end, steady[0].end_s - offset_s)

@@ -11,6 +11,7 @@ from scipy.special import gammaincc
 from olivevib.arrays import Floats
 
 _LARGEST = 10_000_000  # numbers in the column matrix; beyond, a record is long enough without
+_MOST = 1 / 3  # of the samples
 _POWERS = 4  # of time, beside the cosines: they take the slopes at both ends
 
 
@@ -47,22 +48,22 @@ class SwayBasis:
         return np.asarray(np.hstack([waves, np.stack(powers, axis=1)]))
 
 
-def sway_basis(t_s: Floats, limit_hz: float) -> SwayBasis | None:
+def sway_basis(t_s: Floats, limit_hz: float, most: float = _MOST) -> SwayBasis | None:
     """The basis of motion slower than limit_hz on the times t_s (N,).
 
-    None where the limit is 0, the record is too short to spare the columns (more than a third of
-    its samples) or too long to need them.
+    None where the limit is 0, the record is too short to spare the columns (more than the share
+    ``most`` of its samples) or too long to need them.
     """
     span = float(t_s[-1] - t_s[0])
     basis = SwayBasis(float(t_s[0]), span, int(np.floor(2 * span * limit_hz)) + 1)
-    if limit_hz <= 0 or 3 * basis.count > t_s.size or basis.count * t_s.size > _LARGEST:
+    if limit_hz <= 0 or basis.count > most * t_s.size or basis.count * t_s.size > _LARGEST:
         return None
     return basis
 
 
-def sway_columns(t_s: Floats, limit_hz: float) -> Floats | None:
+def sway_columns(t_s: Floats, limit_hz: float, most: float = _MOST) -> Floats | None:
     """Orthonormal columns (N, S) of that basis, the constant among them; None as there."""
-    basis = sway_basis(t_s, limit_hz)
+    basis = sway_basis(t_s, limit_hz, most)
     return None if basis is None else np.asarray(np.linalg.qr(basis.at(t_s))[0])
 
 
