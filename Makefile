@@ -34,7 +34,11 @@ lint: $(VENV)/ready
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-check: lint
+$(VENV)/ready-check: $(VENV)/ready requirements-check.txt
+	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-check.txt
+	@touch $@
+
+check: $(VENV)/ready-check lint
 	$(BIN)/pytest -n 2
 
 sample: $(VENV)/ready
@@ -43,6 +47,7 @@ sample: $(VENV)/ready
 requirements:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --extra test pyproject.toml -o requirements-dev.txt
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header -c requirements-dev.txt pyproject.toml -o requirements.txt
+	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header -c requirements-dev.txt --extra test --extra check pyproject.toml -o requirements-check.txt
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
