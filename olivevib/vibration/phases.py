@@ -68,15 +68,17 @@ _SENSOR_BLOCK_HZ = 800.0
 @dataclass(frozen=True)
 class _Track:
     """How a ridge is read: least tolerance of its frequency; how far the first and last steady
-    window's middle lies inside the steady phase.
+    window's middle lies inside the steady phase; whether the limits are then drawn in to where
+    the amplitude is steady too (a camera's windows are long).
     """
 
     tolerance_hz: float
     reach_s: float
+    plateau: bool
 
 
-_CAMERA_TRACK = _Track(0.15, 0.2)
-_SENSOR_TRACK = _Track(0.1, 0.0)
+_CAMERA_TRACK = _Track(0.15, 0.2, plateau=True)
+_SENSOR_TRACK = _Track(0.1, 0.015, plateau=False)
 _QUIET = 0.25  # of the 90th percentile: below, a window may be rest
 
 
@@ -154,7 +156,8 @@ def _phases(
     at_ends = ridge.t_s[steady.start] - start < ridge.window_s, end - last < ridge.window_s
     first = start if at_ends[0] and on == start else first
     last = end if at_ends[1] and off == end else last
-    first, last = _plateau(short, first, last, (first > start, last < end))
+    if track.plateau:
+        first, last = _plateau(short, first, last, (first > start, last < end))
     decay, stop = _decay(ridge, last, off, fade, track.tolerance_hz)
     cuts = (start, on, first, last, decay, stop, end)
     return _named(cuts, ("rest", "start-up", "steady", "shut-down", "decay", "rest"))
