@@ -9,7 +9,7 @@ from rendered_markers import Canvas, Look, pose
 from test_detection_paper import LIBRARY, PLACES, no_marker, places, scene
 
 from olivevib.detection.refine import fit_template, marker_pixels, point_jacobian
-from olivevib.detection.template import PIXEL_VARIANCE, card, draw_template
+from olivevib.detection.template import PIXEL_VARIANCE, Blur, card, draw_template
 from olivevib.detection.template_reader import TemplateReader
 from olivevib.geometry import apply_homography, homography
 
@@ -36,7 +36,7 @@ def noisy(levels: np.ndarray, rng: np.random.Generator, sigma: float = 2.0) -> n
 def test_the_drawing_agrees_with_the_renderer(size, tilt):
     canvas, H, row = one_marker(size, tilt, 1, samples=24)
     white = card(LIBRARY.layout.pattern(LIBRARY.codes[row]), 2)
-    template = draw_template(white, H, 0.49 + PIXEL_VARIANCE)
+    template = draw_template(white, H, Blur(0.49 + PIXEL_VARIANCE))
     y, x = np.mgrid[40:160, 40:160]
     on = (np.array([x, y]).reshape(2, -1).T - template.origin_px) * 4
     maps = on.astype(np.float32).reshape(120, 120, 2)
@@ -63,11 +63,11 @@ def test_centres_reach_the_bound_and_their_ellipses_hold(size, tilt, limit):
         for _ in range(5):
             grey = noisy(canvas.light, rng)
             fit = None
-            start, variance = homography(STONES, corners + rng.normal(0, 0.3, (4, 2))), 0.7
+            start, blur = homography(STONES, corners + rng.normal(0, 0.3, (4, 2))), Blur(0.7)
             for _ in range(2):
                 pixels = marker_pixels(grey, start, 11)
-                fit = fit_template(draw_template(white, start, variance), pixels)
-                start, variance = fit.H, fit.variance_px2
+                fit = fit_template(draw_template(white, start, blur), pixels)
+                start, blur = fit.H, Blur(blur.variance_px2 + fit.further[0])
             assert fit.converged
             e = apply_homography(fit.H, [[0, 0]])[0] - apply_homography(H, [[0, 0]])[0]
             J = point_jacobian(fit, np.zeros((1, 2)))[0]
@@ -75,7 +75,7 @@ def test_centres_reach_the_bound_and_their_ellipses_hold(size, tilt, limit):
             errors.append(e)
             claimed.append(np.trace(C) / 2)
             normalised.append(e @ np.linalg.solve(C, e))
-            assert np.sqrt(fit.variance_px2 - PIXEL_VARIANCE) == pytest.approx(0.7, abs=0.03)
+            assert np.sqrt(blur.variance_px2 - PIXEL_VARIANCE) == pytest.approx(0.7, abs=0.03)
     assert np.sqrt(np.mean(claimed)) == pytest.approx(limit, rel=0.12)
     assert np.sqrt((np.array(errors) ** 2).mean()) < 1.10 * limit * (1 + 2 / np.sqrt(4 * 60))
     assert 0.88 <= (np.array(normalised) < 5.99).mean() <= 0.99
@@ -85,7 +85,7 @@ def test_derivatives_of_points_against_refitting():
     canvas, H, row = one_marker(64, 40, 5)
     white = card(LIBRARY.layout.pattern(LIBRARY.codes[row]), 2)
     grey = noisy(canvas.light, np.random.default_rng(0))
-    fit = fit_template(draw_template(white, H, 0.57), marker_pixels(grey, H, 11))
+    fit = fit_template(draw_template(white, H, Blur()), marker_pixels(grey, H, 11))
     points = np.vstack([[[0, 0]], STONES])
     J = point_jacobian(fit, points)
     N = np.array([[1, 0, -fit.centre[0]], [0, 1, -fit.centre[1]], [0, 0, fit.scale]]) / fit.scale

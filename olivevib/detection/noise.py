@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 LAGS = 2  # px, up to which noise may be correlated
 DOUBT = 3.0  # standard deviations that make a correlation of the noise believable
-UNKNOWNS = 15
+UNKNOWNS = 15  # of a fit in even, still light
 
 
 def noise_covariance(pixels: Pixels, E: Singles, residual: Singles, clear: Bools) -> Floats:

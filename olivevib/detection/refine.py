@@ -1,7 +1,7 @@
 """Fitting a drawn marker to the image: homography, light, blur, and what is known of them.
 
 Gauss-Newton on all pixels of the marker. Unknowns: 8 of the homography from image to template, 3 of
-the dark level's plane, 3 of the contrast's plane, 1 of the blur's variance. Robust weights (Tukey)
+the dark level's plane, 3 of the contrast's plane, S of the blur's variances. Robust weights (Tukey)
 take covered modules out. See knowledge: the template model, its covariance.
 """
 
@@ -20,7 +20,7 @@ from olivevib.geometry import apply_homography
 
 Singles = NDArray[np.float32]
 
-UNKNOWNS = 15
+UNKNOWNS = 14  # and one for each variance of the blur
 LEAST_GAIN = 4.0  # grey levels between dark and white
 LEAST_PIXELS = 40
 MOST_COLUMNS = 32000  # that cv2.remap takes in one row
@@ -33,31 +33,38 @@ PASSES = 8
 class Fit:
     """A fitted marker.
 
-    H (3, 3): centred modules to px; to_template (3, 3): homography in normalised coordinates
+    H (3, 3): centred modules to px; image, weights (N,): levels that it predicts at
+    the pixels, and their robust weights; to_template (3, 3): homography in normalised coordinates
     X = (x - centre)/scale; covariance (8, 8) of its first eight entries; gain grey levels between
-    dark and white at the centre; rms of the residual, grey levels; variance_px2 of the blur with
-    its sigma; weight: mean robust weight; cells (3, 3): mean weight of each ninth of the marker;
-    ncc: correlation of image and template; converged: the last pass moved nothing.
+    dark and white at the centre; rms of the residual, grey levels; further (S,): variances to
+    add to the template's blur, px²; weight: mean robust weight; cells (3, 3): mean weight of each
+    ninth of the marker; ncc, whole_ncc: correlation of image and template where the marker is
+    clear, and on all of it; converged: the last pass moved nothing.
     """
 
     H: Floats
+    image: Singles
+    weights: Singles
     to_template: Floats
     covariance: Floats
     centre: Floats
     scale: float
     gain: float
     rms: float
-    variance_px2: float
-    variance_sigma_px2: float
+    further: Floats
     weight: float
     cells: Floats
     ncc: float
+    whole_ncc: float
     converged: bool
 
 
 @dataclass(frozen=True)
 class Pixels:
-    """The pixels of one marker: normalised X, Y (N,), grey level (N,), and where they lie."""
+    """The pixels of one marker: normalised X, Y (N,), grey level (N,), and where they lie.
+
+    trust (N,): weight of each pixel by its noise, 1 where nothing is known against it.
+    """
 
     X: Singles
     Y: Singles
@@ -67,14 +74,17 @@ class Pixels:
     x: NDArray[np.intp]
     y: NDArray[np.intp]
     cell: NDArray[np.intp]  # 0…8: which ninth of the marker, row by row
+    trust: Singles
 
 
-def marker_pixels(grey: Grey, H: Floats, modules: int, stride: int = 1) -> Pixels | None:
-    """Every ``stride``-th pixel in each direction on the dark square and REACH modules around it.
+def marker_pixels(
+    grey: Grey, H: Floats, modules: int, stride: int = 1, reach_modules: float = REACH
+) -> Pixels | None:
+    """Every ``stride``-th pixel in each direction on the dark square and some modules around it.
 
     None where fewer than 40 pixels lie in the image.
     """
-    reach = modules / 2 + REACH
+    reach = modules / 2 + reach_modules
     box = apply_homography(H, [[-reach, -reach], [reach, -reach], [reach, reach], [-reach, reach]])
     low = np.maximum(np.ceil(box.min(axis=0)), 0).astype(int)
     high = np.minimum(np.floor(box.max(axis=0)), [grey.shape[1] - 1, grey.shape[0] - 1]).astype(int)
@@ -100,21 +110,23 @@ def marker_pixels(grey: Grey, H: Floats, modules: int, stride: int = 1) -> Pixel
     px, py = x[columns], y[rows]
     X = ((px - centre[0]) / scale).astype(np.float32)
     Y = ((py - centre[1]) / scale).astype(np.float32)
-    return Pixels(X, Y, grey[py, px].astype(np.float32), centre, scale, px, py, cell)
+    return Pixels(
+        X, Y, grey[py, px].astype(np.float32), centre, scale, px, py, cell, np.ones_like(X)
+    )
 
 
 @dataclass
 class _State:
-    """Unknowns in the passes: W (3, 3), light (o, ox, oy, g, gx, gy), change of variance."""
+    """Unknowns in the passes: W (3, 3), light (o, ox, oy, g, gx, gy), blur (S,)."""
 
     W: Floats
     light: Floats
-    spread: float = 0.0
+    further: Floats
 
 
 @dataclass(frozen=True)
 class _Settled:
-    """Where the passes ended: Jacobian (15, N), template level, residual and weight (N,)."""
+    """Where the passes ended: Jacobian (14 + S, N), template level, residual and weight (N,)."""
 
     state: _State
     J: Singles
@@ -124,13 +136,13 @@ class _Settled:
     converged: bool
 
 
-def approach(template: Template, pixels: Pixels) -> tuple[Floats, float] | None:
-    """A first, coarse fit: pose H (3, 3) and variance of the blur, px²; None where it is lost."""
+def approach(template: Template, pixels: Pixels) -> tuple[Floats, Floats] | None:
+    """A first, coarse fit: pose H (3, 3) and further variances (S,); None where it is lost."""
     end = _settle(template, pixels)
     if end is None:
         return None
     H = _from_template(pixels, end.state.W) @ template.H
-    return H / H[2, 2], template.variance_px2 + end.state.spread
+    return H / H[2, 2], end.state.further
 
 
 def fit_template(template: Template, pixels: Pixels) -> Fit | None:
@@ -138,38 +150,42 @@ def fit_template(template: Template, pixels: Pixels) -> Fit | None:
     end = _settle(template, pixels)
     if end is None:
         return None
-    WJ = end.J * end.weight
+    WJ = end.J * (end.weight * pixels.trust)
     try:
         inverse = np.linalg.inv((WJ @ end.J.T).astype(np.float64))
     except np.linalg.LinAlgError:
         return None
     clear = end.weight > CLEAR
-    if clear.sum() <= 2 * UNKNOWNS:
+    unknowns = len(end.J)
+    if clear.sum() <= 2 * unknowns:
         return None
-    rms = float(np.sqrt((end.residual[clear] ** 2).sum() / (clear.sum() - UNKNOWNS)))
+    whitened = np.asarray(end.residual * np.sqrt(pixels.trust), dtype=np.float32)
+    rms = float(np.sqrt((whitened[clear] ** 2).sum() / (clear.sum() - unknowns)))
     H = _from_template(pixels, end.state.W) @ template.H
     counts = np.maximum(np.bincount(pixels.cell, minlength=9), 1)
-    estimate = inverse[:8].astype(np.float32) @ WJ
+    estimate = inverse[:8].astype(np.float32) @ (WJ / np.sqrt(pixels.trust))
     return Fit(
         H=H / H[2, 2],
+        image=pixels.level - end.residual,
+        weights=end.weight,
         to_template=end.state.W,
-        covariance=noise_covariance(pixels, estimate, end.residual, clear),
+        covariance=noise_covariance(pixels, estimate.astype(np.float32), whitened, clear),
         centre=pixels.centre,
         scale=pixels.scale,
         gain=float(end.state.light[3]),
         rms=rms,
-        variance_px2=template.variance_px2 + end.state.spread,
-        variance_sigma_px2=rms * float(np.sqrt(inverse[14, 14])),
+        further=end.state.further,
         weight=float(end.weight.mean()),
         cells=(np.bincount(pixels.cell, end.weight, minlength=9) / counts).reshape(3, 3),
         ncc=_correlation(end.T[clear], pixels.level[clear]),
+        whole_ncc=_correlation(end.T, pixels.level),
         converged=end.converged,
     )
 
 
 def _settle(template: Template, pixels: Pixels) -> _Settled | None:
     """Gauss-Newton with Tukey weights from the second pass on."""
-    state = _State(np.eye(3), np.zeros(6))
+    state = _State(np.eye(3), np.zeros(6), np.zeros(template.texture.shape[2] - 3))
     reads = _read(template, pixels, state.W)
     weight = np.ones_like(pixels.X)
     state.light = _light(pixels, reads[0])
@@ -178,9 +194,9 @@ def _settle(template: Template, pixels: Pixels) -> _Settled | None:
         J, residual = _linearised(pixels, reads, state)
         if step:
             weight = _tukey(residual, state.light[3])
-        WJ = J * weight
+        WJ = J * (weight * pixels.trust)
         A = (WJ @ J.T).astype(np.float64)
-        A[np.diag_indices(UNKNOWNS)] *= 1 + 1e-7
+        A[np.diag_indices(len(A))] *= 1 + 1e-7
         try:
             change = np.asarray(np.linalg.solve(A, WJ @ residual), dtype=np.float64)
         except np.linalg.LinAlgError:
@@ -192,13 +208,13 @@ def _settle(template: Template, pixels: Pixels) -> _Settled | None:
         if step and np.abs(change[:8]).max() * pixels.scale < MOVED_PX:
             converged = True
             break
-    T = reads[0] + np.float32(state.spread) * reads[3]
+    T = _level(reads, state)
     residual = pixels.level - _image(pixels, state, T)
     return _Settled(state, J, T, residual, weight, converged)
 
 
 def _read(template: Template, pixels: Pixels, W: Floats) -> Singles:
-    """Texture (4, N) at the pixels seen through W."""
+    """Texture (3 + S, N) at the pixels seen through W."""
     X, Y = pixels.X, pixels.Y
     M = W.astype(np.float32)
     w = 1 / (M[2, 0] * X + M[2, 1] * Y + M[2, 2])
@@ -226,6 +242,12 @@ def _light(pixels: Pixels, T: Singles) -> Floats:
     return np.asarray(np.linalg.solve(A, (J @ pixels.level).astype(np.float64)))
 
 
+def _level(reads: Singles, state: _State) -> Singles:
+    """Template level (N,), 0 dark, 1 white, with the further blur."""
+    out: Singles = reads[0] + state.further.astype(np.float32) @ reads[3:]
+    return out
+
+
 def _image(pixels: Pixels, state: _State, T: Singles) -> Singles:
     """Grey levels (N,) that template level T has in the present light."""
     X, Y = pixels.X, pixels.Y
@@ -235,11 +257,11 @@ def _image(pixels: Pixels, state: _State, T: Singles) -> Singles:
 
 
 def _linearised(pixels: Pixels, reads: Singles, state: _State) -> tuple[Singles, Singles]:
-    """Jacobian (15, N) and residual (N,) at the present unknowns."""
+    """Jacobian (14 + S, N) and residual (N,) at the present unknowns."""
     X, Y = pixels.X, pixels.Y
     _, _, _, g, gx, gy = state.light.astype(np.float32)
     gain = g + gx * X + gy * Y
-    T = reads[0] + np.float32(state.spread) * reads[3]
+    T = _level(reads, state)
     residual = pixels.level - _image(pixels, state, T)
     M = state.W.astype(np.float32)
     w = 1 / (M[2, 0] * X + M[2, 1] * Y + M[2, 2])
@@ -249,7 +271,7 @@ def _linearised(pixels: Pixels, reads: Singles, state: _State) -> tuple[Singles,
     back *= -w
     one = np.ones_like(X)
     homography = [p * X, p * Y, p, q * X, q * Y, q, back * X, back * Y]
-    J = np.stack([*homography, one, X, Y, T, X * T, Y * T, gain * reads[3]])
+    J = np.stack([*homography, one, X, Y, T, X * T, Y * T, *(gain * reads[3:])])
     return J, residual
 
 
@@ -267,7 +289,7 @@ def _add(state: _State, change: Floats) -> None:
     W.ravel()[:8] += change[:8]
     state.W = W
     state.light = state.light + change[8:14]
-    state.spread += float(change[14])
+    state.further = state.further + change[UNKNOWNS:]
 
 
 def _correlation(a: Singles, b: Singles) -> float:

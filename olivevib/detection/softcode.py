@@ -1,6 +1,6 @@
 """Reading a code from grey levels: each module speaks as loudly as it is clear.
 
-The levels of dark and white are taken from the marker itself in three ways; the library's code with
+The levels of dark and white are taken from the marker itself in four ways; the library's code with
 the best agreement wins. Source: knowledge, soft decoding.
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +18,8 @@ from olivevib.marker import MarkerLibrary
 
 MASK = 0.22  # modules between the 3 x 3 reads of a module
 LOUDEST = 1.3  # agreement of one module, at most
+CLOSING = np.ones((3, 3), dtype=np.uint8)  # modules
+CHANNELS = 128  # readings that OpenCV takes side by side
 
 
 @dataclass(frozen=True)
@@ -68,13 +71,29 @@ class SoftReader:
         return best
 
     def _references(self, levels: Floats) -> list[tuple[Floats, Floats]]:
-        """Dark and white level of each area module (N, c²) or (N, 1), in three ways."""
+        """Dark and white level of each area module (N, c²) or (N, 1), in four ways."""
         bars, white = levels[:, self._bars], levels[:, self._white]
         medians = tuple(np.median(x, axis=1, keepdims=True) for x in (bars, white))
         planes = [levels[:, at] @ through for through, at in self._planes]
         area = levels[:, self._area]
         extremes = (area.min(axis=1, keepdims=True), area.max(axis=1, keepdims=True))
-        return [(medians[0], medians[1]), (planes[0], planes[1]), extremes]
+        return [(medians[0], medians[1]), (planes[0], planes[1]), extremes, self._local(levels)]
+
+    def _local(self, levels: Floats) -> tuple[Floats, Floats]:
+        """White as a closing over the modules shows it: it follows the edge of a shadow."""
+        n = round(np.sqrt(levels.shape[1]))
+        modules = np.ascontiguousarray(
+            levels.reshape(-1, n, n).transpose(1, 2, 0), dtype=np.float32
+        )
+        parts = [
+            cv2.morphologyEx(modules[:, :, k : k + CHANNELS], cv2.MORPH_CLOSE, CLOSING)
+            for k in range(0, modules.shape[2], CHANNELS)
+        ]
+        closed = np.concatenate([np.atleast_3d(part) for part in parts], axis=2)
+        white = np.maximum(closed.transpose(2, 0, 1).reshape(len(levels), -1), 1.0)
+        share = np.median(levels[:, self._bars] / white[:, self._bars], axis=1, keepdims=True)
+        area = white[:, self._area].astype(np.float64)
+        return share * area, area
 
     def _nearest(self, clear: NDArray[np.float32]) -> SoftMatch:
         score = clear @ self._signs.T

@@ -22,21 +22,44 @@ LEAST_BLUR = 0.3  # texture samples; sharper cannot be drawn
 REACH = 0.6  # modules around the dark square that are drawn
 MARGIN_PX = 4.0  # and px around these; beyond them the edge is repeated
 FINENESS = (4, 8, 16, 32)  # drawn samples a module
+LEAST_PATH_PX = 0.5  # a shorter motion is part of the round blur
+PATH_POINTS = 512  # of a motion path
+
+
+@dataclass(frozen=True)
+class Blur:
+    """What smears an image: variance_px2 of a round Gaussian (PSF² + 1/12) and the path motion_px
+    (2,) of a steady motion during the exposure; m and -m are the same.
+    """
+
+    variance_px2: float = 0.7**2 + PIXEL_VARIANCE
+    motion_px: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def path_px(self) -> float:
+        """Length of the motion, px."""
+        return float(np.hypot(*self.motion_px))
+
+    @property
+    def half_width_px(self) -> float:
+        """How far an edge is smeared to either side, px: half the path and two sigma."""
+        return 0.5 * self.path_px + 2 * float(np.sqrt(self.variance_px2))
 
 
 @dataclass(frozen=True)
 class Template:
-    """Texture (h, w, 4) float32: level (0 dark, 1 white), its derivatives by x and y per px, and
-    half its Laplacian per px² (the derivative by the variance of the blur).
+    """Texture (h, w, 3 + S) float32: level (0 dark, 1 white), its derivatives by x and y per px,
+    and by S variances of further blur per px²: S = 1 round; 2 round and along the motion; 3 xx, xy
+    and yy.
 
     origin_px (2,): image point of texture sample (0, 0); H (3, 3): start pose, centred modules to
-    px; variance_px2: PSF² + 1/12; samples a pixel.
+    px; blur it is drawn with; samples a pixel.
     """
 
     texture: NDArray[np.float32]
     origin_px: Floats
     H: Floats
-    variance_px2: float
+    blur: Blur
     samples: int
 
 
@@ -46,42 +69,100 @@ def card(dark: Bools, quiet: int) -> NDArray[np.float32]:
 
 
 def draw_template(
-    white: NDArray[np.float32], H: Floats, variance_px2: float, quiet: int = 2, samples: int = FINE
+    white: NDArray[np.float32],
+    H: Floats,
+    blur: Blur,
+    quiet: int = 2,
+    samples: int = FINE,
+    moments: bool = False,
 ) -> Template:
-    """Draw a card (n, n) with its ``quiet`` zone at pose H with a blur of ``variance_px2``.
+    """Draw a card (n, n) with its ``quiet`` zone at pose H; ``moments`` asks for S = 3.
 
-    Degenerates for a blur below 0.1 px²: the texture's own sampling is then the blur.
+    Degenerates for a variance below 0.1 px²: the texture's own sampling is then the blur.
     """
     half = len(white) / 2
     reach = half - quiet + REACH
     box = apply_homography(H, [[-reach, -reach], [reach, -reach], [reach, reach], [-reach, reach]])
     origin = np.floor(box.min(axis=0) - MARGIN_PX)
     width, height = (np.ceil(box.max(axis=0) + MARGIN_PX) - origin).astype(int) * samples + 1
-    module_px = _module_px(H)
-    fine = min(FINENESS, key=lambda m: abs(np.log(m / (0.7 * samples * module_px))))
+    side_px = module_px(H)
+    fine = min(FINENESS, key=lambda m: abs(np.log(m / (0.7 * samples * side_px))))
     drawn = white.repeat(fine, axis=0).repeat(fine, axis=1)
     to_image = np.array([[1 / samples, 0, origin[0]], [0, 1 / samples, origin[1]], [0, 0, 1]])
     to_drawn = np.array([[fine, 0, fine * half - 0.5], [0, fine, fine * half - 0.5], [0, 0, 1]])
-    level = cv2.warpPerspective(
+    sharp = cv2.warpPerspective(
         drawn,
         to_drawn @ np.linalg.inv(H) @ to_image,
         (int(width), int(height)),
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_REPLICATE,
     )
-    own = 1 / (6 * samples**2) + (module_px / fine) ** 2 / 12  # bilinear reads, drawn ramps
-    sigma = samples * float(np.sqrt(max(variance_px2 - own, 0.0)))
+    own = 1 / (6 * samples**2) + (side_px / fine) ** 2 / 12  # bilinear reads, drawn ramps
+    sigma = samples * float(np.sqrt(max(blur.variance_px2 - own, 0.0)))
+    level = _smeared(np.asarray(sharp, dtype=np.float32), sigma, blur, samples)
+    parts = [level, _slope(level, 1, 0, samples), _slope(level, 0, 1, samples)]
+    parts += _by_variances(level, blur, samples, moments)
+    texture = np.asarray(cv2.merge(parts), dtype=np.float32)
+    return Template(texture, origin, H, blur, samples)
+
+
+def _smeared(
+    level: NDArray[np.float32], sigma: float, blur: Blur, samples: int
+) -> NDArray[np.float32]:
+    out = level
+    if blur.path_px > LEAST_PATH_PX:
+        kernel = _path_kernel(samples * np.array(blur.motion_px))
+        path = cv2.filter2D(out, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+        out = np.asarray(path, dtype=np.float32)
     if sigma > LEAST_BLUR:
         size = 2 * int(np.ceil(3 * sigma)) + 1
-        level = cv2.GaussianBlur(level, (size, size), sigma, borderType=cv2.BORDER_REPLICATE)
-    x = cv2.Sobel(level, cv2.CV_32F, 1, 0, ksize=1, scale=0.5 * samples)
-    y = cv2.Sobel(level, cv2.CV_32F, 0, 1, ksize=1, scale=0.5 * samples)
-    laplacian = cv2.Laplacian(level, cv2.CV_32F, ksize=1, scale=0.5 * samples**2)
-    texture = np.asarray(cv2.merge([level, x, y, laplacian]), dtype=np.float32)
-    return Template(texture, origin, H, variance_px2, samples)
+        smooth = cv2.GaussianBlur(out, (size, size), sigma, borderType=cv2.BORDER_REPLICATE)
+        out = np.asarray(smooth, dtype=np.float32)
+    return out
 
 
-def _module_px(H: Floats) -> float:
+def _path_kernel(path: Floats) -> NDArray[np.float32]:
+    """A straight path (2,), texture samples, as a filter kernel; bilinear along many points."""
+    half = int(np.ceil(np.abs(path).max() / 2)) + 1
+    steps = (np.arange(PATH_POINTS) + 0.5) / PATH_POINTS - 0.5
+    x, y = (half + path[axis] * steps for axis in (0, 1))
+    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
+    kernel = np.zeros((2 * half + 1, 2 * half + 1))
+    for dj, di in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        weight = np.abs(1 - di - (x - i)) * np.abs(1 - dj - (y - j))
+        np.add.at(kernel, (j + dj, i + di), weight)
+    return np.asarray(kernel / kernel.sum(), dtype=np.float32)
+
+
+def _slope(level: NDArray[np.float32], dx: int, dy: int, samples: int) -> NDArray[np.float32]:
+    """Central difference along x or y, per px."""
+    slope = cv2.Sobel(level, cv2.CV_32F, dx, dy, ksize=1, scale=0.5 * samples)
+    return np.asarray(slope, dtype=np.float32)
+
+
+def _by_variances(
+    level: NDArray[np.float32], blur: Blur, samples: int, moments: bool
+) -> list[NDArray[np.float32]]:
+    """Derivatives by further variances: ½ xx, xy, ½ yy; or round, and along the motion."""
+    if not moments and blur.path_px <= LEAST_PATH_PX:
+        round_ = cv2.Laplacian(level, cv2.CV_32F, ksize=1, scale=0.5 * samples**2)
+        return [np.asarray(round_, dtype=np.float32)]
+    second = np.array([1.0, -2.0, 1.0]) * samples**2
+    one = np.array([1.0])
+    xx, yy = (
+        np.asarray(cv2.sepFilter2D(level, cv2.CV_32F, a, b), dtype=np.float32)
+        for a, b in ((second, one), (one, second))
+    )
+    slope = np.array([-0.5, 0.0, 0.5]) * samples
+    xy = np.asarray(cv2.sepFilter2D(level, cv2.CV_32F, slope, slope), dtype=np.float32)
+    if moments:
+        return [np.float32(0.5) * xx, xy, np.float32(0.5) * yy]
+    c, s = np.array(blur.motion_px) / blur.path_px
+    along = (c * c * xx + 2 * c * s * xy + s * s * yy) / 2
+    return [np.float32(0.5) * (xx + yy), np.asarray(along, dtype=np.float32)]
+
+
+def module_px(H: Floats) -> float:
     """Root mean square length of a module's sides at the centre, px."""
     at = H[:2, 2] / H[2, 2]
     sides = (H[:2, :2] - at[:, None] * H[2, :2]) / H[2, 2]

@@ -12,27 +12,21 @@ import numpy as np
 
 from olivevib.arrays import Bools, Floats, Grey, Ints
 from olivevib.detection.candidates import dark_passes, fine_bars
+from olivevib.detection.card_fit import CardFit, fit_card
 from olivevib.detection.detection import Detection
 from olivevib.detection.hypotheses import Frames, frame_hypotheses, joined
 from olivevib.detection.refine import (
     Fit,
-    Singles,
-    approach,
-    fit_template,
-    marker_pixels,
     point_jacobian,
 )
 from olivevib.detection.settings import DetectionSettings
 from olivevib.detection.softcode import SoftMatch, SoftReader
-from olivevib.detection.template import COARSE, PIXEL_VARIANCE, card, draw_template
+from olivevib.detection.template import card
 from olivevib.geometry import apply_homography
-from olivevib.marker import MarkerLayout, MarkerLibrary
+from olivevib.marker import MarkerLibrary
 
-FIRST_VARIANCE_PX2 = 0.7**2 + PIXEL_VARIANCE  # blur at which a marker is drawn first
-VARIANCES_PX2 = (0.15, 6.0)  # blur that is believed
-REDRAWN_PX2 = 0.12  # change of the blur that asks for a new drawing
-COARSE_PX = 15.0  # centre to corner for each pixel of stride in the first fit
-TRIED_WRONG = 8  # modules of 49 that a hypothesis may have wrong before it is fitted
+TRIED_WRONG = (8, 12)  # of 49 modules that a hypothesis may have wrong: two bars, three or four
+SURE = 0.92  # correlation on the whole marker; a wrong code reaches .81 (rendered, to 12 px blur)
 WRONG = (4, 6)  # after the fit: clear, and where a part is covered
 NCC = (0.75, 0.6)
 RMS = (0.16, 0.2)  # of the gain
@@ -48,16 +42,15 @@ class _Found:
 
     row: int
     H: Floats
-    fit: Fit
-    turn: int
+    card: CardFit
     wrong: int
 
 
 class TemplateReader:
     """Reads the markers of one library with the accuracy that the image's noise allows.
 
-    Of the settings only ``conf`` is heeded where it is stricter than the reader's own limit. Each
-    frame is read by itself. Not to be shared between threads.
+    The paper's parameters do not apply. Each frame is read by itself. Not to be shared between
+    threads.
     """
 
     def __init__(self, library: MarkerLibrary, settings: DetectionSettings | None = None) -> None:
@@ -73,8 +66,9 @@ class TemplateReader:
     def detect(self, grey: Grey) -> list[Detection]:
         """All markers in ``grey`` (H, W) uint8, sorted by id.
 
-        Flags: "occluded" (a ninth of the marker or more is covered), "duplicate" (the id was seen
-        at several places; the largest is reported).
+        Flags: "occluded" (a ninth of the marker is covered by 30 % or more), "shadowed" (the light
+        on it had to be evened out), "duplicate" (the id was seen at several places; the largest is
+        reported).
         """
         found: dict[int, Detection] = {}
         for one in self._fitted(grey, self._hypotheses(grey)):
@@ -113,75 +107,56 @@ class TemplateReader:
             near = max(3.0, 0.25 * 11 * float(np.linalg.norm(frames.a[k])))
             if (((places - frames.centre[k]) ** 2).sum(axis=1) < near * near).any():
                 continue
-            one = self._fit(grey, H[k], int(match.row[k]), int(match.turn[k]))
+            code = (int(match.row[k]), int(match.turn[k]), int(match.wrong[k]))
+            one = self._fit(grey, H[k], code)
             if one is not None:
                 found.append(one)
                 places = np.vstack([places, one.H[:2, 2] / one.H[2, 2]])
         return found
 
-    def _fit(self, grey: Grey, H: Floats, row: int, turn: int) -> _Found | None:
-        """Fit the drawing of one code, turned as it was read, and accept or refuse it."""
+    def _fit(self, grey: Grey, H: Floats, code: tuple[int, int, int]) -> _Found | None:
+        """Fit the drawing of a code (row, turn, wrong modules) and accept or refuse it.
+
+        It is accepted where it reads as itself again, or, blurred beyond reading, where the whole
+        drawing agrees with the image as no other code's could.
+        """
+        row, turn, first_wrong = code
         start = _turned(H, turn)
-        fit = fit_card(grey, self._cards[row], start, self.library.layout)
-        if fit is None or not _sound(fit, start, self.library.layout.cornerstones):
+        card_fit = fit_card(grey, self._cards[row], start, self.library.layout)
+        if card_fit is None:
+            return None
+        fit = card_fit.fit
+        if not _sound(fit, start, self.library.layout.cornerstones):
             return None
         again = self._soft.match(grey, fit.H[None])
-        robust = fit.weight < COVERED
-        same = int(again.row[0]) == row and int(again.turn[0]) == 0
-        limit = min(WRONG[robust], max(1, int(self.settings.conf * 49 + 1e-9)) + WRONG[robust])
-        if not same or again.wrong[0] > limit:
+        wrong = int(again.wrong[0])
+        read = int(again.row[0]) == row and int(again.turn[0]) == 0
+        clear = read and wrong <= WRONG[fit.weight < COVERED]
+        if not clear and fit.whole_ncc < SURE:
             return None
-        return _Found(row, fit.H, fit, turn, int(again.wrong[0]))
+        return _Found(row, fit.H, card_fit, wrong if read else first_wrong)
 
     def _detection(self, one: _Found) -> Detection:
         stones = self.library.layout.cornerstones
         points = np.vstack([np.zeros((1, 2)), stones])
         px = apply_homography(one.H, points)
-        J = point_jacobian(one.fit, points)
+        fit = one.card.fit
+        J = point_jacobian(fit, points)
         corners = J[1:].reshape(8, 8)
-        covered = bool(one.fit.cells.min() < CELL)
+        flags = ["occluded"] if fit.cells.min() < CELL else []
+        if one.card.uneven:
+            flags.append("shadowed")
         return Detection(
             id=int(self.library.ids[one.row]),
             corners_px=px[1:],
-            corners_cov_px2=corners @ one.fit.covariance @ corners.T,
+            corners_cov_px2=corners @ fit.covariance @ corners.T,
             centre_px=px[0],
-            centre_cov_px2=J[0] @ one.fit.covariance @ J[0].T,
+            centre_cov_px2=J[0] @ fit.covariance @ J[0].T,
             raw_row=px[:, 1],
             localiser="template",
             bit_errors=one.wrong,
-            flags=("occluded",) if covered else (),
+            flags=tuple(flags),
         )
-
-
-def fit_card(grey: Grey, white: Singles, H: Floats, layout: MarkerLayout) -> Fit | None:
-    """Fit a card to the image from pose H: first coarsely, then drawn again where it was found.
-
-    None where it does not fit: no contrast, outside the image, lost.
-    """
-    stride = max(1, round(_reach_px(H, layout) / COARSE_PX))
-    pixels = marker_pixels(grey, H, layout.modules, stride)
-    if pixels is None:
-        return None
-    first = draw_template(white, H, FIRST_VARIANCE_PX2, layout.quiet, COARSE)
-    found = approach(first, pixels)
-    for _ in range(2):
-        if found is None or not np.isfinite(found[0]).all():
-            return None
-        H, variance = found[0], float(np.clip(found[1], *VARIANCES_PX2))
-        pixels = marker_pixels(grey, H, layout.modules)
-        if pixels is None:
-            return None
-        fit = fit_template(draw_template(white, H, variance, layout.quiet), pixels)
-        if fit is None or abs(fit.variance_px2 - variance) < REDRAWN_PX2:
-            break
-        found = fit.H, fit.variance_px2
-    return fit
-
-
-def _reach_px(H: Floats, layout: MarkerLayout) -> float:
-    """Mean distance from centre to cornerstones, px."""
-    px = apply_homography(H, np.vstack([[[0.0, 0.0]], layout.cornerstones]))
-    return float(np.linalg.norm(px[1:] - px[0], axis=1).mean())
 
 
 def _sound(fit: Fit, start: Floats, stones: Floats) -> bool:
@@ -198,7 +173,8 @@ def _sound(fit: Fit, start: Floats, stones: Floats) -> bool:
 
 def _order(frames: Frames, match: SoftMatch, side: int) -> Ints:
     """Hypotheses worth a fit, the surest first."""
-    worth: Bools = match.wrong <= TRIED_WRONG * side * side / 49
+    most = np.where(frames.support >= 3, TRIED_WRONG[1], TRIED_WRONG[0])
+    worth: Bools = match.wrong * 49 <= most * side * side
     order = np.lexsort((-match.score, -frames.support, match.wrong))
     out: Ints = order[worth[order]]
     return out

@@ -1,0 +1,173 @@
+"""Fitting one marker from a rough pose: coarse, fine, and what light and motion ask for besides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from olivevib.arrays import Floats, Grey
+from olivevib.detection.refine import Fit, Pixels, Singles, approach, fit_template, marker_pixels
+from olivevib.detection.template import COARSE, REACH, Blur, draw_template, module_px
+from olivevib.detection.uneven import closed_light, template_light
+from olivevib.geometry import apply_homography
+from olivevib.marker import MarkerLayout
+
+VARIANCES_PX2 = (0.15, 6.0)  # blur that is believed
+REDRAWN_PX2 = 0.12  # change of the blur that asks for a new drawing
+COARSE_PX = 15.0  # centre to corner for each pixel of stride in the first fit
+EVEN = 0.05  # rms over gain of a marker in even light, covered parts left out
+BETTER = 0.7  # of that rms: what evening out the light must achieve to be believed
+ROUNDS = 3  # of light and fit in turn
+UNEVEN_VARIANCE = 2.5  # covariance of fits in uneven light, times; set on rendered shadows
+MOVING_PX2 = 0.9  # variance of the blur from which a motion is looked for
+ELONGATED_PX2 = 0.3  # difference of the blur's two variances that is a motion
+MOTION_ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class CardFit:
+    """A fitted marker with the blur it has, and whether its light had to be evened out."""
+
+    fit: Fit
+    blur: Blur
+    uneven: bool = False
+
+
+def fit_card(grey: Grey, white: Singles, H: Floats, layout: MarkerLayout) -> CardFit | None:
+    """Fit a card to the image from pose H (3, 3), centred modules to px.
+
+    None where it does not fit: no contrast, outside the image, lost.
+    """
+    stride = max(1, round(_reach_px(H, layout) / COARSE_PX))
+    pixels = marker_pixels(grey, H, layout.modules, stride)
+    if pixels is None:
+        return None
+    blur = Blur()
+    found = approach(draw_template(white, H, blur, layout.quiet, COARSE), pixels)
+    one = None if found is None else _fine(grey, white, layout, found[0], _rounder(blur, found[1]))
+    if one is not None and one.fit.rms <= EVEN * one.fit.gain:
+        return one
+    if one is not None and one.blur.variance_px2 > MOVING_PX2:
+        one = _moving(grey, white, layout, one)
+        if one.fit.rms <= EVEN * one.fit.gain:
+            return one
+    even = _even(grey, white, H, layout, pixels)
+    if one is None or even is None:
+        return even or one
+    return even if _noise(even) < BETTER * _noise(one) else one
+
+
+def _fine(
+    grey: Grey, white: Singles, layout: MarkerLayout, H: Floats, blur: Blur
+) -> CardFit | None:
+    """Draw where the marker was found and fit all pixels; once more if the blur was other."""
+    one = None
+    for _ in range(2):
+        pixels = _blurred_pixels(grey, H, blur, layout)
+        fit = pixels and fit_template(draw_template(white, H, blur, layout.quiet), pixels)
+        if not fit or not np.isfinite(fit.H).all():
+            return None
+        wider = _rounder(blur, fit.further)
+        one = CardFit(fit, wider)
+        if abs(fit.further[0]) < REDRAWN_PX2:
+            break
+        H, blur = fit.H, wider
+    return one
+
+
+def _moving(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit) -> CardFit:
+    """The same marker with a motion path where its blur is longer than wide; ``one`` if not."""
+    H, blur = one.fit.H, replace(one.blur, motion_px=(0.0, 0.0))
+    pixels = _blurred_pixels(grey, H, blur, layout)
+    template = draw_template(white, H, blur, layout.quiet, moments=True)
+    fit = pixels and fit_template(template, pixels)
+    if not fit:
+        return one
+    moving = _motion(blur, fit.further)
+    best = one
+    for _ in range(MOTION_ROUNDS):
+        if moving.path_px == 0 or not np.isfinite(fit.H).all():
+            return best
+        H = fit.H
+        pixels = _blurred_pixels(grey, H, moving, layout)
+        fit = pixels and fit_template(draw_template(white, H, moving, layout.quiet), pixels)
+        if not fit:
+            return best
+        moving = _longer(moving, fit.further)
+        if fit.rms / fit.gain < _noise(best):
+            best = CardFit(fit, moving)
+    return best
+
+
+def _even(
+    grey: Grey, white: Singles, H: Floats, layout: MarkerLayout, pixels: Pixels
+) -> CardFit | None:
+    """Fit with the light divided out: as a closing shows it, then as the template shows it."""
+    side, blur = module_px(H), Blur()
+    coarse = draw_template(white, H, blur, layout.quiet, COARSE)
+    found = approach(coarse, closed_light(grey, pixels, side))
+    if found is None or not np.isfinite(found[0]).all():
+        return None
+    H, blur = found[0], _rounder(blur, found[1])
+    raw = marker_pixels(grey, H, layout.modules)
+    if raw is None:
+        return None
+    even = closed_light(grey, raw, side)
+    fit: Fit | None = None
+    for _ in range(ROUNDS + 1):
+        fit = fit_template(draw_template(white, H, blur, layout.quiet), even)
+        if fit is None or not np.isfinite(fit.H).all():
+            return None
+        H, blur = fit.H, _rounder(blur, fit.further)
+        even = template_light(raw, fit.image, fit.weights, side)
+    assert fit is not None
+    return CardFit(replace(fit, covariance=UNEVEN_VARIANCE * fit.covariance), blur, uneven=True)
+
+
+def _blurred_pixels(grey: Grey, H: Floats, blur: Blur, layout: MarkerLayout) -> Pixels | None:
+    """All pixels of the marker that nothing beyond its card is smeared into."""
+    if not np.isfinite(H).all():
+        return None
+    reach = min(REACH, layout.quiet - blur.half_width_px / module_px(H))
+    return marker_pixels(grey, H, layout.modules, reach_modules=reach)
+
+
+def _rounder(blur: Blur, further: Floats) -> Blur:
+    return replace(blur, variance_px2=_believed(blur.variance_px2 + float(further[0])))
+
+
+def _longer(blur: Blur, further: Floats) -> Blur:
+    """A moving blur with further variances: round, and along its path (path² / 12)."""
+    path2 = max(blur.path_px**2 + 12 * float(further[1]), 0.0)
+    scale = float(np.sqrt(path2)) / blur.path_px
+    x, y = blur.motion_px
+    return Blur(_believed(blur.variance_px2 + float(further[0])), (scale * x, scale * y))
+
+
+def _motion(blur: Blur, further: Floats) -> Blur:
+    """A motion along the longer axis of the blur, if it is clearly longer; xx, xy, yy added."""
+    xx, xy, yy = further
+    small, large = np.linalg.eigvalsh(
+        blur.variance_px2 * np.eye(2) + np.array([[xx, xy], [xy, yy]])
+    )
+    if large - small < ELONGATED_PX2:
+        return replace(blur, motion_px=(0.0, 0.0))
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
+    small = _believed(float(small))
+    path = float(np.sqrt(12 * (large - small))) if large > small else 0.0
+    return Blur(small, (path * float(np.cos(angle)), path * float(np.sin(angle))))
+
+
+def _believed(variance_px2: float) -> float:
+    return float(np.clip(variance_px2, *VARIANCES_PX2))
+
+
+def _noise(one: CardFit) -> float:
+    return one.fit.rms / one.fit.gain
+
+
+def _reach_px(H: Floats, layout: MarkerLayout) -> float:
+    """Mean distance from centre to cornerstones, px."""
+    px = apply_homography(H, np.vstack([[[0.0, 0.0]], layout.cornerstones]))
+    return float(np.linalg.norm(px[1:] - px[0], axis=1).mean())
