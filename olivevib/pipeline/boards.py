@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from olivevib.arrays import Grey
-from olivevib.calibration import Board, BoardFinder, BoardView, board_from_table, parse_board
+from olivevib.calibration.boards import Board, board_from_table, parse_board
+from olivevib.calibration.finding import BoardFinder
+from olivevib.calibration.views import BoardView
 from olivevib.detection import Detector
 from olivevib.errors import Caution, UsageError
 from olivevib.files.stills import open_source
@@ -87,7 +89,7 @@ class _Note:
 def _look(
     trial: Trial, board: Board, path: Path, side: str, notes: dict[str, _Note]
 ) -> Iterator[_Seen]:
-    finder = BoardFinder(board, _reader(trial, board))
+    finder = BoardFinder(board, board_reader(trial, board))
     with open_source(path, side) as source:
         every = max(1, (source.count_hint or 200) // SAMPLE_FRAMES)
         for frame in source.frames():
@@ -100,8 +102,8 @@ def _look(
         notes[side] = _Note(source.kind, source.size_px, tuple(source.cautions))
 
 
-def _reader(trial: Trial, board: Board) -> Detector | None:
-    """The detector of the trial's own library, for boards of coded markers."""
+def board_reader(trial: Trial, board: Board) -> Detector | None:
+    """The detector of the trial's own library, for boards of coded markers; None for others."""
     if board.kind != "coded":
         return None
     library = trial.settings.markers.library

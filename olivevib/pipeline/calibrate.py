@@ -12,8 +12,9 @@ from olivevib.files.store import write_stage
 from olivevib.geometry import CameraModel, StereoRig
 from olivevib.progress import Tick, silent
 from olivevib.trial import Trial
-from olivevib.trial.fingerprints import RIG, Fingerprint
+from olivevib.trial.fingerprints import RIG
 from olivevib.trial.records.calibration import CalibrationRecord, calibration_file
+from olivevib.trial.stages import Fingerprint
 
 
 def calibrate(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
