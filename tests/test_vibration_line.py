@@ -219,3 +219,19 @@ def test_sway_columns_are_orthonormal_and_span_slow_motion():
     assert np.abs(slow - columns @ (columns.T @ slow)).max() < 1e-3
     assert sway_columns(t, 0.0) is None
     assert sway_columns(t[:20], 2.5) is None
+
+
+def test_dense_records_are_averaged_in_blocks_without_a_trace():
+    """A sensor of 2 kHz: block means make it fast, their gain and noise are given back."""
+    rng = np.random.default_rng(10)
+    facts = SamplingFacts(2000.0, stamps_true=True, band_hz=(5.0, 45.0))
+    tone = Tone(24.37, np.array([99.0, 50.0, 10.0]), np.array([0.0, 1.0, 2.0]))
+    t = np.arange(12_000) / 2000
+    clean = fit_line(displacement(t, tone.at(t)), facts, LineSettings(sway=False))
+    assert abs(clean.line.f_hz - tone.f_hz) < 1e-9
+    np.testing.assert_allclose(clean.line.amplitude, tone.amplitude, rtol=1e-8)
+    x = tone.at(t) + 2.0 * rng.normal(size=(t.size, 3))
+    noisy = fit_line(displacement(t, x), facts, LineSettings(sway=False))
+    np.testing.assert_allclose(noisy.fit.noise, 2.0, rtol=0.06)
+    np.testing.assert_allclose(noisy.line.amplitude_sigma, 2.0 * np.sqrt(2 / t.size), rtol=0.1)
+    assert noisy.line.f_sigma_hz == pytest.approx(frequency_bound(tone, t, 2.0), rel=0.1)

@@ -9,6 +9,7 @@ from scipy.special import gammaincinv
 
 from olivevib.arrays import Bools, Floats
 from olivevib.signals import Samples
+from olivevib.vibration.blocks import block_means, block_size, undone
 from olivevib.vibration.chirp import Chirp, find_chirp
 from olivevib.vibration.clock import Clock, clock_of, measured
 from olivevib.vibration.lsscan import OVERSAMPLING, Scan, scan
@@ -19,6 +20,7 @@ from olivevib.vibration.verdict import Finding, SamplingFacts, fold, judge
 
 _FEWEST = 12  # samples below which nothing is called a line
 _APART = 1.5  # bins of 1/T that two waves must lie apart to be told apart safely
+_EVEN_ENOUGH = 1e-3  # periods
 _MOST = 0.5  # of the motion that a line must explain not to be asked about its speed
 _ROUNDING = 1e-9  # of the line: what is left below that is arithmetic, not motion
 _LOCAL = 16  # bins either side whose median is the local noise
@@ -118,12 +120,20 @@ class _Search:
     facts: SamplingFacts
     settings: LineSettings
     clock: Clock
+    block: int  # samples that were averaged into one
+    sample_hz: float
 
     @classmethod
     def of(
         cls, t_s: Floats, values: Floats, facts: SamplingFacts, settings: LineSettings
     ) -> _Search:
-        return cls(t_s, values, facts, settings, clock_of(t_s))
+        clock = clock_of(t_s)
+        dense = facts.direct and clock.complete and clock.worst_periods < _EVEN_ENOUGH
+        block = block_size(clock.rate_hz, facts.band_hz[1], t_s.size) if dense else 1
+        if block > 1:
+            t_s, values = block_means(t_s, values, block)
+        shown = clock if block == 1 else clock_of(t_s)
+        return cls(t_s, values, facts, settings, shown, block, clock.rate_hz)
 
     @property
     def bin_hz(self) -> float:
@@ -133,6 +143,12 @@ class _Search:
     def top_hz(self) -> float:
         half = self.clock.rate_hz / 2
         return min(half, self.facts.band_hz[1]) if self.facts.direct else half
+
+    @property
+    def left_top_hz(self) -> float:
+        """Up to where what a fit leaves is looked at: neighbours, noise around the line."""
+        half = self.clock.rate_hz / 2
+        return min(half, 3 * self.facts.band_hz[1]) if self.facts.direct else half
 
     def fitted(self) -> tuple[SineFit | None, Floats | None]:
         """The line above the sway first; only where there is none, one among the sway (blind)."""
@@ -179,7 +195,7 @@ class _Search:
             if float(fit.noise.max()) < _ROUNDING * float(fit.amplitude.max()):
                 break
             lost = 0 if sway is None else sway.shape[1]
-            left = scan(self.t_s, fit.residual, self.clock.rate_hz / 2, lost)
+            left = scan(self.t_s, fit.residual, self.left_top_hz, lost)
             allowed = left.f_hz > (self.facts.sway_hz if sway is not None else 0.0)
             start = strongest(left, allowed, self.settings.false_alarm)
             if start is None:
@@ -269,7 +285,10 @@ def _judged(search: _Search, fit: SineFit, sway: Floats | None, samples: Samples
         fit = search.with_harmonics(finding.candidates_hz[0], tuple(fit.f_hz[1:]), sway)
         finding = _finding(search, fit, samples.unit)
     sway_hz = 0.0 if sway is None else search.facts.sway_hz
-    return LineFit(_line(search, fit, sway, finding, samples.unit), fit, sway_hz)
+    coloured = _coloured(search, fit, sway)
+    if search.block > 1:
+        fit = undone(fit, search.block, search.sample_hz)
+    return LineFit(_line(search, fit, coloured, finding, samples.unit), fit, sway_hz)
 
 
 def _finding(search: _Search, fit: SineFit, unit: str) -> Finding:
@@ -281,9 +300,8 @@ def _finding(search: _Search, fit: SineFit, unit: str) -> Finding:
     return judge(seen, facts, largest, search.clock.span_s)
 
 
-def _line(search: _Search, fit: SineFit, sway: Floats | None, finding: Finding, unit: str) -> Line:
+def _line(search: _Search, fit: SineFit, coloured: Floats, finding: Finding, unit: str) -> Line:
     blind = finding.status is LineStatus.BLIND
-    coloured = _coloured(search, fit, sway)
     unknown = np.full(3, np.nan)
     return Line(
         f_hz=float(fit.f_hz[0]),
@@ -306,7 +324,7 @@ def _coloured(search: _Search, fit: SineFit, sway: Floats | None) -> Floats:
     var A = Sn/T and var f = 3 Sn/(pi^2 A^2 T^3) need the density *at* the line.
     """
     lost = 0 if sway is None else sway.shape[1]
-    left = scan(search.t_s, fit.residual, search.clock.rate_hz / 2, lost)
+    left = scan(search.t_s, fit.residual, search.left_top_hz, lost)
     seen = fold(float(fit.f_hz[0]), search.clock.rate_hz)
     distance = np.abs(left.f_hz - seen) / search.bin_hz
     near = (distance < _LOCAL / 2) & (distance > 1)

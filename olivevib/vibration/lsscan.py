@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import fft
 from scipy.special import gammaincc, gammaln
 
 from olivevib.arrays import Floats
-from olivevib.vibration.sums import fourier_sums
+from olivevib.vibration.sums import Complexes, fourier_sums
 
 OVERSAMPLING = 4  # scan points per 1/T
+_MANY = 2000  # samples from which an even record goes through the FFT
+_EVEN = 1e-6  # of a period
 _WELL_POSED = 1e-3  # determinant of cosine and sine after the mean, of its value far from folds
 
 
@@ -73,10 +76,14 @@ def scan(
     centred = values - values.mean(axis=0)
     span = span_s or float(t_s[-1] - t_s[0]) * n / max(1, n - 1)
     step = 1.0 / (OVERSAMPLING * span)
+    period = float(t_s[-1] - t_s[0]) / max(1, n - 1)
+    even = n > _MANY and bool((np.abs(t_s - t_s[0] - period * np.arange(n)) < _EVEN * period).all())
+    if even:
+        step = 1.0 / (period * fft.next_fast_len(int(np.ceil(1.0 / (step * period))), real=True))
     count = max(OVERSAMPLING + 1, int(np.floor(top_hz / step)) + 1)
-    since = t_s - t_s.mean()
     f_hz = np.asarray(np.arange(count) * step, dtype=np.float64)
-    explained = _explained(since, centred, step, count)
+    sums = _even_sums(centred, period, f_hz) if even else _sums(t_s - t_s.mean(), centred, f_hz)
+    explained = _explained(n, *sums)
     keep = slice(OVERSAMPLING, None)
     return Scan(
         f_hz=f_hz[keep],
@@ -87,12 +94,37 @@ def scan(
     )
 
 
-def _explained(since: Floats, centred: Floats, step: float, count: int) -> Floats:
-    n = since.size
-    ones = np.ones((n, 1))
+def _sums(since: Floats, centred: Floats, f_hz: Floats) -> tuple[Complexes, Complexes, Complexes]:
+    """Sums of values exp(-iwt) (F, C), of exp(-iwt) and of exp(-2iwt) (F,), t from its mean."""
+    step, count = float(f_hz[1]), f_hz.size
+    ones = np.ones((since.size, 1))
     both = fourier_sums(since, np.hstack([centred, ones]), step, count)
-    y, e1 = both[:, :-1], both[:, -1]
-    e2 = fourier_sums(since, ones, 2 * step, count)[:, 0]
+    return both[:, :-1], both[:, -1], fourier_sums(since, ones, 2 * step, count)[:, 0]
+
+
+def _even_sums(
+    centred: Floats, period: float, f_hz: Floats
+) -> tuple[Complexes, Complexes, Complexes]:
+    """The same sums of a long even record: one padded FFT and two Dirichlet kernels."""
+    n = centred.shape[0]
+    padded = round(1.0 / (period * float(f_hz[1])))
+    turns = f_hz * period
+    y = fft.rfft(centred, padded, axis=0)[: f_hz.size]
+    y = y * np.exp(1j * np.pi * turns * (n - 1))[:, None]
+    kernels = [_dirichlet(k * turns, n).astype(np.complex128) for k in (1, 2)]
+    return y, kernels[0], kernels[1]
+
+
+def _dirichlet(turns: Floats, n: int) -> Floats:
+    """Sum of exp(-2 pi i turns k) over k centred on zero, n terms: real for symmetry."""
+    below = np.sin(np.pi * turns)
+    near = np.abs(below) < 1e-12
+    sign = np.where(np.rint(turns) % 2 == 0, 1.0, (-1.0) ** (n - 1))
+    kernel = np.sin(np.pi * turns * n) / np.where(near, 1.0, below)
+    return np.asarray(np.where(near, n * sign, kernel))
+
+
+def _explained(n: int, y: Complexes, e1: Complexes, e2: Complexes) -> Floats:
     c, s = e1.real, -e1.imag
     cc = (n + e2.real) / 2 - c * c / n
     ss = (n - e2.real) / 2 - s * s / n

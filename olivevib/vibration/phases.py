@@ -10,7 +10,7 @@ import numpy as np
 from olivevib.arrays import Bools, Floats
 from olivevib.signals import Samples, fit_stamps
 from olivevib.vibration.clock import measured
-from olivevib.vibration.ridge import Ridge, camera_ridge, sensor_ridge
+from olivevib.vibration.ridge import Ridge, camera_ridge, sensor_ridge, sensor_rms
 
 NAMES = ("rest", "start-up", "steady", "shut-down", "decay")
 WHOLE = "whole"
@@ -62,7 +62,7 @@ _RAMP_S = 0.5  # a start-up or shut-down reaches at most so far into the steady 
 _SENSOR_WINDOW_S, _SENSOR_HOP_S = 0.3, 0.02
 _SENSOR_ONSET_S = 0.1
 _SENSOR_BAND_HZ = (3.0, 100.0)
-_SENSOR_BLOCK_HZ = 800.0
+_SENSOR_BLOCK_HZ = 400.0
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class _Track:
 
 
 _CAMERA_TRACK = _Track(0.15, 0.2, plateau=True)
-_SENSOR_TRACK = _Track(0.1, 0.015, plateau=False)
+_SENSOR_TRACK = _Track(0.1, 0.0, plateau=False)
 _QUIET = 0.25  # of the 90th percentile: below, a window may be rest
 
 
@@ -114,7 +114,7 @@ def find_sensor_phases(sensor: Samples, settings: PhaseSettings = DEFAULTS) -> t
         return ()
     even_t, even = _even_blocks(t_s, values)
     ridge = sensor_ridge(even_t, even, _SENSOR_BAND_HZ, _SENSOR_WINDOW_S, _SENSOR_HOP_S)
-    short = sensor_ridge(even_t, even, _SENSOR_BAND_HZ, _SENSOR_ONSET_S, _SENSOR_HOP_S / 2)
+    short = sensor_rms(even_t, even, _SENSOR_ONSET_S, _SENSOR_HOP_S / 2)
     if ridge.t_s.size < 3:
         return ()
     return _phases(short, ridge, (float(t_s[0]), float(t_s[-1])), _SENSOR_TRACK, settings)

@@ -144,3 +144,21 @@ def _peaks(power: Floats, f: Floats, inside: np.ndarray, scale: float) -> Floats
     total = band.sum(axis=1)
     share = (peak**2 + left**2 + right**2) / np.where(total > 0, total, 1.0)
     return np.stack([(at + shift) * f[1], np.sqrt(total * scale), share], axis=1)
+
+
+def sensor_rms(t_s: Floats, values: Floats, window_s: float, hop_s: float) -> Ridge:
+    """Rolling RMS of an even record (N, C), the mean of each window left out; no frequencies.
+
+    Leaving the means out keeps gravity and motion slower than the window away.
+    """
+    rate = (t_s.size - 1) / float(t_s[-1] - t_s[0])
+    n, hop = max(4, round(window_s * rate)), max(1, round(hop_s * rate))
+    first = np.arange(0, t_s.size - n + 1, hop)
+    zero = np.zeros((1, values.shape[1]))
+    sums = np.concatenate([zero, np.cumsum(values - values.mean(axis=0), axis=0)])
+    squares = np.concatenate([zero, np.cumsum((values - values.mean(axis=0)) ** 2, axis=0)])
+    mean = (sums[first + n] - sums[first]) / n
+    power = (squares[first + n] - squares[first]) / n - mean**2
+    rms = np.sqrt(np.maximum(power.sum(axis=1), 0.0))
+    unknown = np.full(first.size, np.nan)
+    return Ridge(t_s[0] + (first + n / 2) / rate, unknown, rms, unknown, window_s)
