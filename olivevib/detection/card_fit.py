@@ -23,6 +23,8 @@ UNEVEN_VARIANCE = 2.5  # covariance of fits in uneven light, times; set on rende
 MOVING_PX2 = 0.9  # variance of the blur from which a motion is looked for
 ELONGATED_PX2 = 0.3  # difference of the blur's two variances that is a motion
 MOTION_ROUNDS = 3
+BEYOND = 0.25  # image sizes by which a marker's card may leave the image
+WIDEST_PX = 900.0  # of a marker's card
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ def fit_card(grey: Grey, white: Singles, H: Floats, layout: MarkerLayout) -> Car
 
     None where it does not fit: no contrast, outside the image, lost.
     """
+    if not plausible(H, layout, grey.shape):
+        return None
     stride = max(1, round(_reach_px(H, layout) / COARSE_PX))
     pixels = marker_pixels(grey, H, layout.modules, stride)
     if pixels is None:
@@ -66,7 +70,7 @@ def _fine(
     for _ in range(2):
         pixels = _blurred_pixels(grey, H, blur, layout)
         fit = pixels and fit_template(draw_template(white, H, blur, layout.quiet), pixels)
-        if not fit or not np.isfinite(fit.H).all():
+        if not fit:
             return None
         wider = _rounder(blur, fit.further)
         one = CardFit(fit, wider)
@@ -87,7 +91,7 @@ def _moving(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit) -> C
     moving = _motion(blur, fit.further)
     best = one
     for _ in range(MOTION_ROUNDS):
-        if moving.path_px == 0 or not np.isfinite(fit.H).all():
+        if moving.path_px == 0:
             return best
         H = fit.H
         pixels = _blurred_pixels(grey, H, moving, layout)
@@ -107,17 +111,17 @@ def _even(
     side, blur = module_px(H), Blur()
     coarse = draw_template(white, H, blur, layout.quiet, COARSE)
     found = approach(coarse, closed_light(grey, pixels, side))
-    if found is None or not np.isfinite(found[0]).all():
+    if found is None:
         return None
     H, blur = found[0], _rounder(blur, found[1])
-    raw = marker_pixels(grey, H, layout.modules)
+    raw = _blurred_pixels(grey, H, blur, layout)
     if raw is None:
         return None
     even = closed_light(grey, raw, side)
     fit: Fit | None = None
     for _ in range(ROUNDS + 1):
         fit = fit_template(draw_template(white, H, blur, layout.quiet), even)
-        if fit is None or not np.isfinite(fit.H).all():
+        if fit is None or not plausible(fit.H, layout, grey.shape):
             return None
         H, blur = fit.H, _rounder(blur, fit.further)
         even = template_light(raw, fit.image, fit.weights, side)
@@ -125,9 +129,28 @@ def _even(
     return CardFit(replace(fit, covariance=UNEVEN_VARIANCE * fit.covariance), blur, uneven=True)
 
 
+def plausible(H: Floats, layout: MarkerLayout, shape: tuple[int, ...]) -> bool:
+    """Whether H shows a whole marker, front side, not far beyond the image (height, width).
+
+    What a fit that lost its way returns is caught here, before it is drawn at any size.
+    """
+    reach = layout.modules / 2 + layout.quiet
+    box = np.array([[-reach, -reach, 1], [reach, -reach, 1], [reach, reach, 1], [-reach, reach, 1]])
+    px = box @ H.T
+    if not np.isfinite(px).all() or (px[:, 2] * px[0, 2] <= 1e-3 * px[0, 2] ** 2).any():
+        return False
+    corners = px[:, :2] / px[:, 2:]
+    size = np.array([shape[1], shape[0]])
+    inside = (corners > -BEYOND * size).all() and (corners < (1 + BEYOND) * size).all()
+    d, e = corners[2] - corners[0], corners[3] - corners[1]
+    return bool(
+        inside and d[0] * e[1] - d[1] * e[0] > 0 and np.ptp(corners, axis=0).max() < WIDEST_PX
+    )
+
+
 def _blurred_pixels(grey: Grey, H: Floats, blur: Blur, layout: MarkerLayout) -> Pixels | None:
-    """All pixels of the marker that nothing beyond its card is smeared into."""
-    if not np.isfinite(H).all():
+    """All pixels of the marker that nothing beyond its card is smeared into; None if H is wild."""
+    if not plausible(H, layout, grey.shape):
         return None
     reach = min(REACH, layout.quiet - blur.half_width_px / module_px(H))
     return marker_pixels(grey, H, layout.modules, reach_modules=reach)

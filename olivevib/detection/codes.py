@@ -12,6 +12,9 @@ from olivevib.arrays import Bools, Floats, Grey, Ints
 from olivevib.marker import MarkerLayout, MarkerLibrary
 
 
+TOGETHER = 1024  # readings at a time: memory stays small whatever an image holds
+
+
 @dataclass(frozen=True)
 class Match:
     """The best code for each of N readings.
@@ -96,17 +99,15 @@ def read_modules(grey: Grey, H: Floats, points: Floats) -> Floats:
 
     Samples outside the image take the nearest pixel.
     """
-    count, (samples, mask, _) = len(H), points.shape
-    if count == 0:
-        return np.empty((0, samples))
-    p = points.reshape(-1, 2)
-    w = H @ np.vstack([p.T, np.ones(len(p))])
-    maps = (w[:, :2] / w[:, 2:]).astype(np.float32)
-    levels = np.empty((count, samples * mask), dtype=np.uint8)
-    for first in range(0, count, 8192):  # cv2.remap takes at most 32767 rows
-        part = slice(first, first + 8192)
-        levels[part] = cv2.remap(
-            grey, maps[part, 0], maps[part, 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    samples, mask, _ = points.shape
+    p = np.column_stack([points.reshape(-1, 2), np.ones(samples * mask)]).T
+    levels = np.empty((len(H), samples), dtype=np.float64)
+    for first in range(0, len(H), TOGETHER):
+        part = slice(first, first + TOGETHER)
+        w = H[part] @ p
+        maps = (w[:, :2] / w[:, 2:]).astype(np.float32)
+        read = cv2.remap(
+            grey, maps[:, 0], maps[:, 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )
-    out: Floats = levels.reshape(count, samples, mask).mean(axis=2)
-    return out
+        levels[part] = read.reshape(-1, samples, mask).mean(axis=2)
+    return levels

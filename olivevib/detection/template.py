@@ -21,6 +21,7 @@ PIXEL_VARIANCE = 1 / 12  # px² of a pixel's own area, as a Gaussian
 LEAST_BLUR = 0.3  # texture samples; sharper cannot be drawn
 REACH = 0.6  # modules around the dark square that are drawn
 MARGIN_PX = 4.0  # and px around these; beyond them the edge is repeated
+LARGE_PX = 20.0  # side of a module from which the coarse drawing is fine enough
 FINENESS = (4, 8, 16, 32)  # drawn samples a module
 LEAST_PATH_PX = 0.5  # a shorter motion is part of the round blur
 PATH_POINTS = 512  # of a motion path
@@ -80,6 +81,7 @@ def draw_template(
 
     Degenerates for a variance below 0.1 px²: the texture's own sampling is then the blur.
     """
+    samples = samples if module_px(H) < LARGE_PX else COARSE
     half = len(white) / 2
     reach = half - quiet + REACH
     box = apply_homography(H, [[-reach, -reach], [reach, -reach], [reach, reach], [-reach, reach]])
