@@ -214,6 +214,11 @@ def measured_trial(
 ) -> Path:
     """A trial of which every stage is done."""
     new_trial(folder, TOML + SENSOR if sensor else TOML)
+    return remeasure(folder, status, sensor)
+
+
+def remeasure(folder: Path, status: LineStatus = LineStatus.DIRECT, sensor: bool = True) -> Path:
+    """Write every stage's result for the inputs as they are now."""
     trial = Trial.open(folder)
 
     def write(stage: str, file: str, make, *values: object) -> None:

@@ -43,7 +43,7 @@ class OlivevibApp(App[None]):
     VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # noqa: RUF012
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("j", "jump", "Jump to a pane", show=False),
-        Binding("question_mark", "help", "Help", key_display="?"),
+        Binding("question_mark,f1", "help", "Help", key_display="?"),
         Binding("l", "sunlight", "Light theme on/off", show=False),
         Binding("q", "quit", "Quit", show=False),
     ]

@@ -10,6 +10,7 @@ from textual.command import DiscoveryHit, Hit, Hits, Provider
 from textual.content import Content
 
 from olivevib.tui.harmless import harmless
+from olivevib.tui.keys import keys_of
 from olivevib.tui.screens.page import Command, Page
 
 if TYPE_CHECKING:
@@ -34,11 +35,10 @@ class OlivevibCommands(Provider):
 
     def _commands(self) -> Iterator[Command]:
         olive = cast("OlivevibApp", self.app)
-        for active in self.screen.active_bindings.values():
-            binding = active.binding
-            if active.enabled and binding.description and not binding.action.startswith("scroll"):
-                words = f"{binding.description} ({binding.key_display or binding.key})"
-                yield Command(words, partial(olive.run_action, binding.action, active.node))
+        for key in keys_of(self.screen):
+            node = olive if key.on_app else self.screen
+            words = f"{key.words} ({key.shown})"
+            yield Command(words, partial(olive.run_action, key.action, node))
         if isinstance(self.screen, Page):
             yield from self.screen.commands()
         for folder in olive.trials:

@@ -5,6 +5,7 @@ Everything heavy is imported inside: the first picture of the app waits for none
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +16,7 @@ from olivevib.errors import InputError, OlivevibError
 if TYPE_CHECKING:
     from olivevib.comparison import Comparison
     from olivevib.reconstruction import Trajectory
-    from olivevib.trial import Trial, TrialSettings
+    from olivevib.trial import Trial
     from olivevib.tui.views.setting_rows import SettingRow
     from olivevib.vibration import Vibration
 
@@ -54,17 +55,18 @@ class TrialRow:
 
 @dataclass(frozen=True)
 class TrialFacts:
-    """Everything the trial screen shows: the summary (as ``show --json``) and the settings."""
+    """Everything the trial screen shows.
+
+    summary: as ``show --json``; None where a result cannot be read, and then ``fault`` says why.
+    """
 
     folder: Path
-    summary: Mapping[str, Any]
-    settings: TrialSettings
+    name: str
+    simulated: bool
+    stages: tuple[StageLine, ...]
+    summary: Mapping[str, Any] | None = None
+    fault: OlivevibError | None = None
     resume: str = ""
-
-    @property
-    def stages(self) -> tuple[StageLine, ...]:
-        """The stages in order."""
-        return _lines(self.summary["stages"])
 
 
 @dataclass(frozen=True)
@@ -111,13 +113,19 @@ def _row(folder: Path) -> TrialRow:
     trial = Trial.open(folder)
     session, tree = trial.settings.session, trial.settings.tree
     about = [str(part) for part in (session.date, session.place, tree.cultivar) if part]
-    stages = _lines({n: vars(s) for n, s in trial.states().items()})
+    stages = stage_lines(trial)
     quality = quality_of(stages, trial)
     return TrialRow(folder, trial.name, stages, quality, ", ".join(about), session.simulated)
 
 
-def _lines(stages: Mapping[str, Mapping[str, Any]]) -> tuple[StageLine, ...]:
-    return tuple(StageLine(n, str(s["state"]), str(s["reason"])) for n, s in stages.items())
+def stage_lines(trial: Trial) -> tuple[StageLine, ...]:
+    """The stages in order; files of the trial are named from its folder on."""
+    here = f"{trial.folder.resolve()}{os.sep}"
+    near = f"{trial.folder}{os.sep}"
+    return tuple(
+        StageLine(name, state.state.value, state.reason.replace(here, "").replace(near, ""))
+        for name, state in trial.states().items()
+    )
 
 
 def quality_of(stages: tuple[StageLine, ...], trial: Trial) -> Quality:
@@ -150,7 +158,17 @@ def trial_facts(folder: Path) -> TrialFacts:
     trial = Trial.open(folder)
     journal = trial.private / "track.journal"
     resume = "tracking was stopped half way: run goes on from there" if journal.exists() else ""
-    return TrialFacts(folder, summary(trial), trial.settings, resume)
+    stages = stage_lines(trial)
+    found = guarded(lambda: summary(trial))
+    return TrialFacts(
+        folder,
+        trial.name,
+        trial.settings.session.simulated,
+        stages,
+        None if isinstance(found, OlivevibError) else found,
+        found if isinstance(found, OlivevibError) else None,
+        resume,
+    )
 
 
 def results(folder: Path) -> Results:

@@ -36,9 +36,11 @@ class ErrorScreen(ModalScreen[None]):
         self.dismiss()
 
 
-def error_text(error: OlivevibError) -> Text:
+def error_text(error: OlivevibError | None) -> Text:
     """The three parts of an error as text; lines of a list of faults stay lines."""
     out = Text()
+    if error is None:
+        return out
     for title, part in (("", error.what), ("", error.why), ("Next: ", error.remedy)):
         if part:
             lines = "\n".join(harmless(line, 400) for line in part.splitlines()[:40])

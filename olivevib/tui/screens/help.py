@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -12,14 +12,8 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
+from olivevib.tui.keys import Key, keys_of
 from olivevib.tui.screens.page import Help, Page
-
-
-class KeyLine(NamedTuple):
-    """A key and what it does."""
-
-    key: str
-    words: str
 
 
 class HelpScreen(ModalScreen[None]):
@@ -29,7 +23,7 @@ class HelpScreen(ModalScreen[None]):
         Binding("escape,question_mark,enter,q", "dismiss", "Close"),
     ]
 
-    def __init__(self, title: str, about: Help, keys: Sequence[KeyLine]) -> None:
+    def __init__(self, title: str, about: Help, keys: Sequence[Key]) -> None:
         super().__init__()
         self._title, self._about, self._keys = title, about, keys
 
@@ -46,17 +40,11 @@ class HelpScreen(ModalScreen[None]):
 
 
 def help_on(page: Page) -> HelpScreen:
-    """The help of a page, with the keys that work on it now."""
-    app = page.app
-    keys = [
-        KeyLine(b.binding.key_display or app.get_key_display(b.binding), b.binding.description)
-        for b in page.active_bindings.values()
-        if b.binding.description and b.node in (page, app)
-    ]
-    return HelpScreen(page.NAME, page.HELP_TEXT, keys)
+    """The help of a page, with its keys."""
+    return HelpScreen(page.NAME, page.HELP_TEXT, keys_of(page))
 
 
-def help_text(about: Help, keys: Sequence[KeyLine]) -> Text:
+def help_text(about: Help, keys: Sequence[Key]) -> Text:
     """The sheet as text."""
     out = Text()
     out.append(f"{about.about}\n\n")
@@ -64,9 +52,9 @@ def help_text(about: Help, keys: Sequence[KeyLine]) -> Text:
         out.append("Good values\n", "bold")
         out.append(f"{about.good}\n\n")
     out.append("Keys\n", "bold")
-    width = max((len(k.key) for k in keys), default=0)
-    for line in keys:
-        out.append(f"  {line.key.ljust(width)}  ", "bold")
-        out.append(f"{line.words}\n")
+    width = max((len(key.shown) for key in keys), default=0)
+    for key in keys:
+        out.append(f"  {key.shown.ljust(width)}  ", "bold")
+        out.append(f"{key.words}\n")
     out.rstrip()
     return out

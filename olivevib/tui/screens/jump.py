@@ -31,7 +31,7 @@ class JumpScreen(ModalScreen[str | None]):
     def on_mount(self) -> None:
         """Put each letter on the upper left corner of its pane."""
         for letter, region in self._places.items():
-            self.query_one(f"#jump-{letter}").styles.offset = (region.x + 2, region.y)
+            self.query_one(f"#jump-{letter}").styles.offset = (region.x, region.y)
 
     def on_key(self, event: events.Key) -> None:
         """Take the letter."""

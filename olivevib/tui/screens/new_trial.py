@@ -69,7 +69,6 @@ class NewTrialPage(Page):
 
     def on_mount(self) -> None:
         """Start at the name."""
-        super().on_mount()
         for side in SHOWN:
             self.query_one(f"#{side}-first", Picture).say(f"pick the {side} recording")
         self.query_one("#trial").focus()

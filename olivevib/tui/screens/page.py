@@ -86,7 +86,10 @@ class Page(Screen[None]):
         yield from ()
 
     def on_mount(self) -> None:
-        """Read now, and again whenever work has changed the files."""
+        """Read now, and again whenever work has changed the files.
+
+        Textual calls the handlers of base classes by itself: subclasses do not call this one.
+        """
         self.watch(self.app, "revision", self.reload)
         self.watch(self.app, "theme", self.recolour, init=False)
 

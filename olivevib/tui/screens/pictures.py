@@ -63,8 +63,6 @@ class PicturesPage(Page):
 
     def on_mount(self) -> None:
         """Start with the whole picture."""
-        super().on_mount()
-        self.query_one("#whole").add_class("-shown")
         self.query_one("#whole").focus()
 
     def on_unmount(self) -> None:
@@ -112,7 +110,6 @@ class PicturesPage(Page):
         if isinstance(message.value, OlivevibError):
             self._stop()
             self.query_one("#whole", Picture).say(str(message.value))
-        super().on_page_read(message)
 
     @property
     def _ids(self) -> list[int]:
@@ -159,8 +156,14 @@ class PicturesPage(Page):
             self._choose(ids[(ids.index(marker) + step) % len(ids)])
 
     def action_zoom(self) -> None:
-        """In a small terminal: the whole picture or the window; else the window alone."""
-        self.toggle_class("-zoomed")
+        """Picture and window, the picture alone, the window alone (small: one or the other)."""
+        if self.has_class("-narrow") or self.has_class("-alone"):
+            self.remove_class("-alone")
+            self.toggle_class("-zoomed")
+        elif not self.has_class("-zoomed"):
+            self.add_class("-alone")
+        else:
+            self.remove_class("-zoomed")
 
     def action_play(self) -> None:
         """Play in slow motion, or stop."""

@@ -46,7 +46,6 @@ class ReportPage(Page):
 
     def on_mount(self) -> None:
         """Start in the table."""
-        super().on_mount()
         table = self.query_one("#outputs", DataTable)
         table.border_title = "Report and exports"
         table.add_columns("kind", "state", "what it holds")
@@ -63,7 +62,7 @@ class ReportPage(Page):
         newest = _newest(self.folder)
         places = {"report": self.folder / "report.html"}
         places |= {to: pipeline.export_place(trial, to) for to in FORMATS}
-        rows = tuple(Output(kind, p, _state(p, newest)) for kind, p in places.items())
+        rows = tuple(Output(k, _near(p), _state(p, newest)) for k, p in places.items())
         if path is None or not path.t_s.size:
             return Outputs(rows[:1], extent_words(0, 0, 0.0, ""))
         seconds = float(path.t_s[-1] - path.t_s[0])
@@ -112,6 +111,12 @@ class ReportPage(Page):
     def action_report(self) -> None:
         """Make the report."""
         self.olive.start(jobs.make_report(self.folder))
+
+
+def _near(path: Path) -> str:
+    """A path as seen from where the app was started."""
+    here, whole = Path.cwd(), path.resolve()
+    return str(whole.relative_to(here) if whole.is_relative_to(here) else whole)
 
 
 def _newest(folder: Path) -> int:

@@ -69,9 +69,8 @@ class ResultsPage(Page):
 
     def on_mount(self) -> None:
         """Orbits first."""
-        super().on_mount()
         table = self.query_one("#markers", DataTable)
-        table.border_title = "3 Markers (peak of the dominant line)"
+        table.border_title = "3 Markers (x, y, z: peak of the dominant line)"
         table.add_columns(*MARKER_COLUMNS)
         self.action_pane("orbits")
 

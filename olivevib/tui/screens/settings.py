@@ -53,7 +53,6 @@ class SettingsPage(Page):
 
     def on_mount(self) -> None:
         """Start in the table."""
-        super().on_mount()
         table = self.query_one("#settings", DataTable)
         table.border_title = "trial.toml"
         table.add_columns("key", "value")

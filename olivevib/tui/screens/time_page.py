@@ -40,7 +40,6 @@ class TimePage(Page):
 
     def on_mount(self) -> None:
         """Start in the plot."""
-        super().on_mount()
         self.query_one("#curves").focus()
 
     def plot(self) -> MotionPlot | None:

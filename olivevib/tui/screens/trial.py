@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -14,6 +15,7 @@ from textual.widgets import DataTable, Static
 from olivevib.tui import jobs
 from olivevib.tui.harmless import plain
 from olivevib.tui.loader import STAGE_NAMES, TrialFacts, trial_facts
+from olivevib.tui.screens.error import error_text
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.widgets.title import Title
 
@@ -64,7 +66,6 @@ class TrialPage(Page):
 
     def on_mount(self) -> None:
         """Name the panes."""
-        super().on_mount()
         for name, title in (("stages", "Stages"), ("warnings", "Warnings"), ("facts", "Known")):
             self.query_one(f"#{name}").border_title = title
         table = self.query_one("#stages", DataTable)
@@ -78,19 +79,25 @@ class TrialPage(Page):
         return trial_facts(self.folder)
 
     def show(self, value: object) -> None:
-        """States, warnings, facts."""
+        """States, warnings, facts; where a result is damaged, what to do about it."""
         if not isinstance(value, TrialFacts):
             return
+        self._facts = value
+        self.query_one(Title).say(value.name, "simulated" if value.simulated else "")
+        self._show_stages(value)
+        self._show_words(value)
+
+    def _show_words(self, facts: TrialFacts) -> None:
         from olivevib.tui.views.tables import facts_text, warnings_text
 
-        self._facts = value
-        palette, summary = self.olive.palette, value.summary
-        simulated = ("simulated",) if summary["simulated"] else ()
-        self.query_one(Title).say(summary["trial"], *simulated)
-        self._show_stages(value)
-        self.query_one("#warning-text", Static).update(warnings_text(summary["warnings"], palette))
-        self.query_one("#fact-text", Static).update(facts_text(summary, palette))
-        count = len(summary["warnings"])
+        palette, summary = self.olive.palette, facts.summary
+        if summary is None:
+            warnings, known, count = error_text(facts.fault), Text(""), 1
+        else:
+            warnings, count = warnings_text(summary["warnings"], palette), len(summary["warnings"])
+            known = facts_text(summary, palette)
+        self.query_one("#warning-text", Static).update(warnings)
+        self.query_one("#fact-text", Static).update(known)
         self.query_one("#warnings").border_title = f"Warnings ({count})" if count else "Warnings"
 
     def _show_stages(self, facts: TrialFacts) -> None:
@@ -116,7 +123,7 @@ class TrialPage(Page):
         self.olive.start(jobs.run_all(self.folder))
 
     @on(DataTable.RowSelected, "#stages")
-    def _show_stage(self) -> None:
+    def action_open(self) -> None:
         """Show what the marked stage found."""
         page = FOUND_ON[STAGE_NAMES[self.query_one("#stages", DataTable).cursor_row]]
         if page:

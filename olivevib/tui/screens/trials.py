@@ -22,6 +22,11 @@ from olivevib.tui.views.trial_list import columns_of, empty_text, matching, tria
 MOST_ROWS = 200  # of one page: a table of thousands would be slow
 
 
+def whole_path(path: Path) -> str:
+    """The path from the root, as a person would look for it."""
+    return str(path.resolve())
+
+
 class TrialsPage(Page):
     """The first screen."""
 
@@ -66,7 +71,6 @@ class TrialsPage(Page):
 
     def on_mount(self) -> None:
         """Start with the table."""
-        super().on_mount()
         self.query_one("#trials").border_title = "Trials"
         self.query_one("#trials").focus()
 
@@ -94,7 +98,8 @@ class TrialsPage(Page):
         self._rows = {f: self._rows.get(f) or TrialRow(f, f.name) for f in folders}
         self.set_class(not folders, "-empty")
         here = (self.folder / "trials").is_dir()
-        self.query_one("#empty", Static).update(empty_text(self.folder, here, self.olive.palette))
+        words = empty_text(whole_path(self.folder), here, self.olive.palette)
+        self.query_one("#empty", Static).update(words)
         self._fill()
 
     @on(RowRead)

@@ -127,6 +127,8 @@ def orbits_plot(
 ) -> Text:
     """The small multiples in ``size`` (columns, rows); ``chosen`` is marked with ▶."""
     cells = Cells(*size)
+    if size[0] < LEAST_COLUMNS or size[1] <= LEAST_ROWS:
+        return cells.text()
     page = page_of(orbits, plane, chosen, size)
     scale = mm_per_dot(orbits, plane, page)
     for k, tile in enumerate(page.tiles):

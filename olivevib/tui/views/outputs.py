@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from rich.text import Text
 
@@ -32,7 +31,7 @@ class Output:
     """One thing that can be written: its kind, its place, whether it is there and newer results."""
 
     kind: str
-    path: Path
+    place: str
     state: str  # "not made", "made", "older than the results"
 
 
@@ -54,7 +53,7 @@ def preview_text(output: Output, extent: str, palette: Palette) -> Text:
     out = Text()
     made = output.state != "not made"
     out.append("Made: " if made else "Enter writes ", palette.accent)
-    out.append(f"{harmless(output.path, 300)}\n")
+    out.append(f"{harmless(output.place, 300)}\n")
     out.append(f"{HOLDS.get(output.kind, 'the 3-D paths')}. {extent}", palette.muted)
     if made:
         out.append("\nEnter writes it again; nothing else is touched.", palette.muted)

@@ -124,7 +124,7 @@ def _brackets(
     if x1 - x0 < 2 or y1 - y0 < 1:
         ends = {(x0, y0): "▪"}
     words = {(x0 + 1 + k, max(0, y0)): c for k, c in enumerate(outline.words)}
-    trail = np.floor((outline.trail_px - corner) * scale).astype(np.int64).tolist()
+    trail = (tuple(at) for at in np.floor((outline.trail_px - corner) * scale).tolist())
     for at, char in {**dict.fromkeys(trail, "·"), **ends, **words}.items():
         overlay[at] = (char, outline.chosen)
 

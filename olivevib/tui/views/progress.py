@@ -9,7 +9,7 @@ from rich.cells import cell_len
 from olivevib.tui.harmless import cut, harmless
 from olivevib.tui.views.words import seconds_left
 
-BAR = 20
+BAR, WIDE = 20, 100
 ESCAPE = "Esc cancels, work is kept"
 
 
@@ -29,16 +29,16 @@ def progress_line(progress: Progress, columns: int, cancelling: bool = False) ->
     """One line of at most ``columns`` cells; the way to stop it is never cut off."""
     tail = "stopping at the next safe place" if cancelling else ESCAPE
     room = columns - cell_len(tail) - 3
-    note = harmless(f"{progress.title}: {progress.note}" if progress.note else progress.title, 80)
-    line = cut("  ".join(part for part in (_bar(progress), note, _speed(progress)) if part), room)
-    return f"{line} · {tail}"
+    bar = _bar(progress, BAR if columns >= WIDE else BAR // 2)
+    parts = (bar, _speed(progress), harmless(progress.note, 40), harmless(progress.title, 60))
+    return f"{cut('  '.join(part for part in parts if part), room)} · {tail}"
 
 
-def _bar(progress: Progress) -> str:
+def _bar(progress: Progress, length: int) -> str:
     if not progress.total:
         return f"{progress.done}" if progress.done else ""
-    full = min(BAR, BAR * progress.done // progress.total)
-    return f"{'█' * full}{'░' * (BAR - full)} {progress.done}/{progress.total}"
+    full = min(length, length * progress.done // progress.total)
+    return f"{'█' * full}{'░' * (length - full)} {progress.done}/{progress.total}"
 
 
 def _speed(progress: Progress) -> str:

@@ -23,7 +23,7 @@ QUALITY_MEANINGS = {
     "failed": "bad",
     "unreadable": "bad",
 }
-MARKER_COLUMNS = ("id", "place", "seen", "x mm", "y mm", "z mm", "p-p mm", "rms m/s²", "frequency")
+MARKER_COLUMNS = ("id", "place", "frequency", "p-p mm", "seen", "x mm", "y mm", "z mm", "rms m/s²")
 
 
 def meaning(palette: Palette, name: str | None) -> Style:
@@ -51,11 +51,11 @@ def marker_row(marker: Mapping[str, Any], palette: Palette) -> tuple[Text, ...]:
     return (
         Text(str(marker["id"]), justify="right"),
         plain(marker["place"] or "–", 12),
+        Text(marker_frequency(marker), meaning(palette, "good" if known else "warn")),
+        Text(short(marker["displacement_pp_mm"], 3), justify="right"),
         Text(f"{marker['seen_fraction']:.0%}", justify="right"),
         *(Text(peak, justify="right") for peak in peaks),
-        Text(short(marker["displacement_pp_mm"], 3), justify="right"),
         Text(short(marker["acceleration_rms_m_s2"], 2), justify="right"),
-        Text(marker_frequency(marker), meaning(palette, "good" if known else "warn")),
     )
 
 

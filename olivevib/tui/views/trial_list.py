@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 
 from rich.text import Text
 
@@ -63,14 +62,12 @@ def why_text(row: TrialRow, palette: Palette) -> Text:
     return out
 
 
-def empty_text(workspace: Path, is_workspace: bool, palette: Palette) -> Text:
+def empty_text(place: str, is_workspace: bool, palette: Palette) -> Text:
     """What to do first where there is no trial yet, with the keys."""
     out = Text(justify="left")
-    place = harmless(workspace.resolve(), 60)
     out.append("No trials here yet.\n\n", palette.accent)
-    out.append(
-        f"{place} " + ("holds no trial.\n\n" if is_workspace else "is no workspace yet.\n\n")
-    )
+    out.append(f"{harmless(place, 70)}\n", palette.muted)
+    out.append("holds no trial.\n\n" if is_workspace else "is no workspace yet.\n\n")
     for key, words in (
         ("n", "make a trial from two recordings"),
         ("d", "make a simulated trial, to try everything"),

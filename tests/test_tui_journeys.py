@@ -1,0 +1,513 @@
+"""Journeys through the app by keys and by mouse, on a real workspace on disk."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+import time
+from pathlib import Path
+
+import pytest
+import tui_scene as scene
+from small_videos import make_video
+from textual.widgets import DataTable, Input, Static
+from tui_app import press, screen_text, settle, started
+
+from olivevib.errors import InputError
+from olivevib.progress import Cancelled
+from olivevib.trial import Trial
+from olivevib.tui.screens.error import ErrorScreen
+from olivevib.tui.screens.new_trial import NewTrialPage
+from olivevib.tui.screens.report import ReportPage
+from olivevib.tui.screens.results import ResultsPage
+from olivevib.tui.screens.trial import TrialPage
+from olivevib.tui.screens.trials import TrialsPage
+from olivevib.tui.themes import DARK, SUNLIGHT
+from olivevib.tui.widgets.picture import Picture
+from olivevib.tui.work import Result, Work
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory) -> Path:
+    return scene.workspace(tmp_path_factory.mktemp("tui") / "olive")
+
+
+@pytest.fixture
+def workspace(made, tmp_path, monkeypatch) -> Path:
+    shutil.copytree(made, tmp_path / "olive")
+    monkeypatch.chdir(tmp_path / "olive")
+    return tmp_path / "olive"
+
+
+async def test_the_list_tells_the_state_of_every_trial(workspace):
+    async with started(workspace) as (app, pilot):
+        text = screen_text(app)
+        for start in ("2026-11-20_T04  clean", "2026-11-20_T05  warnings", "2026-11-21_T06  unfi"):
+            assert start in text
+        assert "○ missing" in text
+        assert "– skipped" in text
+        await press(pilot, "down")
+        assert "frequency-undecided" in words(app, "#why")
+
+
+async def test_from_the_list_to_results_report_and_back_by_keys(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter")
+        assert isinstance(app.screen, TrialPage)
+        assert "● done" in screen_text(app)
+        await press(pilot, "v")
+        assert isinstance(app.screen, ResultsPage)
+        await press(pilot, "escape", "e")
+        assert isinstance(app.screen, ReportPage)
+        await press(pilot, "down", "enter")
+        assert (workspace / "trials/2026-11-20_T04/exports/2026-11-20_T04.csv").is_file()
+        assert "made" in screen_text(app)
+        await press(pilot, "escape", "escape")
+        assert isinstance(app.screen, TrialsPage)
+
+
+async def test_the_report_is_made_and_its_place_shown(workspace):
+    async with started(workspace, (80, 24)) as (app, pilot):
+        await press(pilot, "enter", "e", "e")
+        page = workspace / "trials/2026-11-20_T04/report.html"
+        assert page.read_text(encoding="utf-8").lower().startswith("<!doctype html>")
+        assert "Made: trials/2026-11-20_T04/report.html" in screen_text(app)
+
+
+async def test_one_stage_runs_and_the_state_is_read_from_the_files(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "down", "down", "enter", "t")
+        folder = workspace / "trials/2026-11-21_T06"
+        assert (folder / "calibration.h5").is_file()
+        assert app.progress is None
+        table = app.screen.query_one("#stages", DataTable)
+        assert str(table.get_cell_at((0, 1))) == "● done"
+        shutil.copy(folder / "shared_rig.toml", folder / "calibration.h5")
+        app.revision += 1
+        await settle(pilot)
+        assert str(table.get_cell_at((0, 1))) == "◐ stale"
+
+
+async def test_a_failure_is_shown_until_it_is_read_and_keeps_what_was_done(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "down", "down", "enter", "r")
+        assert isinstance(app.screen, ErrorScreen)
+        text = words(app, ".dialog > Static")
+        assert "left.avi is not a video" in text
+        assert "Next:" in text
+        await press(pilot, "escape")
+        table = app.screen.query_one("#stages", DataTable)
+        assert [str(table.get_cell_at((k, 1))) for k in range(2)] == ["● done", "✗ failed"]
+        recording = workspace / "trials/2026-11-21_T06/left.avi"
+        assert recording.read_bytes() == b"not decoded in these tests"
+
+
+class Endless:
+    """Work that goes on until it is cancelled."""
+
+    def __init__(self) -> None:
+        self.started, self.stopped = threading.Event(), threading.Event()
+
+    def __call__(self, tick) -> Result:
+        try:
+            while True:
+                tick(30, 120, "tracking markers")
+                self.started.set()
+                time.sleep(0.005)
+        except Cancelled:
+            self.stopped.set()
+            raise
+
+
+def told(app) -> str:
+    """What the toasts say."""
+    return " ".join(n.message for n in app._notifications)
+
+
+def words(app, selector: str) -> str:
+    """The text of a widget."""
+    return str(app.screen.query_one(selector, Static).render())
+
+
+async def running(pilot, endless: Endless) -> None:
+    """Wait until the work has been shown."""
+    while not (endless.started.is_set() and pilot.app.progress.total):
+        await pilot.pause(0.01)
+
+
+async def test_escape_cancels_and_says_that_work_is_kept(workspace):
+    endless = Endless()
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter")
+        app.start(Work("T04: run", endless))
+        await running(pilot, endless)
+        assert "30/120" in screen_text(app)
+        assert "Esc cancels, work is kept" in screen_text(app)
+        await press(pilot, "escape")
+        assert endless.stopped.is_set()
+        assert isinstance(app.screen, TrialPage)
+        assert app.progress is None
+        assert "Cancelled; finished work is kept" in told(app)
+        await press(pilot, "escape")
+        assert isinstance(app.screen, TrialsPage)
+
+
+async def test_one_work_at_a_time_and_screens_stay_usable(workspace):
+    endless = Endless()
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter")
+        app.start(Work("T04: run", endless))
+        await running(pilot, endless)
+        await pilot.press("r")
+        await pilot.pause()
+        assert isinstance(app.screen, ErrorScreen)
+        await pilot.press("escape")
+        await pilot.press("l")
+        await pilot.pause()
+        assert app.theme == SUNLIGHT
+        app.action_cancel_work()
+        await settle(pilot)
+        assert endless.stopped.is_set()
+
+
+async def test_leaving_stops_the_work_first(workspace):
+    endless = Endless()
+    async with started(workspace) as (app, pilot):
+        app.start(Work("T04: run", endless))
+        await running(pilot, endless)
+        await pilot.press("q")
+        await settle(pilot)
+    assert endless.stopped.is_set()
+    assert app.return_code == 0
+
+
+async def test_an_unforeseen_error_does_not_take_the_app_down(workspace):
+    async with started(workspace) as (app, pilot):
+        app.start(Work("x", lambda tick: 1 / 0))
+        await settle(pilot)
+        assert isinstance(app.screen, ErrorScreen)
+        assert "ZeroDivisionError" in screen_text(app)
+
+
+# -- results --------------------------------------------------------------------------------------
+
+
+async def test_markers_are_chosen_by_key_table_mouse_and_palette(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "v")
+        await press(pilot, "right_square_bracket")
+        assert "▶2 trunk" in screen_text(app)
+        await press(pilot, "left_square_bracket", "left_square_bracket")
+        assert "▶9 twig" in screen_text(app)
+        await pilot.click("#orbits", offset=(5, 3))
+        await settle(pilot)
+        assert "▶1 trunk" in screen_text(app)
+        await press(pilot, "j", "m", "down", "down")
+        assert "▶5 branch" in screen_text(app)
+        await press(pilot, "ctrl+p", *"marker9", "down", "enter")
+        assert "▶9 twig" in screen_text(app)
+        assert "marker 9 twig" in screen_text(app)
+
+
+async def test_spectrum_cursor_axis_and_quantity(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "v", "2", "right")
+        assert "12.000 Hz" in screen_text(app)
+        await press(pilot, "a")
+        assert "displacement x ·" in screen_text(app)
+        await press(pilot, "y", "y")
+        assert "acceleration x ·" in screen_text(app)
+        assert "m/s²│" in screen_text(app)
+        await pilot.click("#spectrum", offset=(20, 8))
+        await settle(pilot)
+        assert "12.000 Hz" not in screen_text(app).replace("12.0000", "")
+
+
+async def test_a_small_terminal_shows_one_pane_at_a_time(workspace):
+    async with started(workspace, (80, 24)) as (app, pilot):
+        await press(pilot, "enter", "v")
+        panes = app.screen.query("#results > .pane")
+        assert [pane.id for pane in panes if pane.display] == ["orbits"]
+        await press(pilot, "z")
+        assert "direct" in screen_text(app)
+        await press(pilot, "3")
+        assert "p-p mm" in screen_text(app)
+
+
+async def test_an_undecided_frequency_is_never_a_single_number(workspace):
+    async with started(workspace, (80, 24)) as (app, pilot):
+        await press(pilot, "down", "v", "2")
+        text = screen_text(app)
+        assert "ambiguous: 5.00, 12.00, 18.00, 25.00, 42.00 Hz" in text
+        assert "12.0000" not in text
+
+
+async def test_a_trial_without_results_says_what_to_do(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "down", "down", "v")
+        assert "no marker has a path yet" in screen_text(app)
+        assert "r runs the stages" in screen_text(app)
+        await press(pilot, "m")
+        assert "Not analysed yet" in screen_text(app)
+        await press(pilot, "escape", "escape", "c")
+        assert "no accelerometer file is named" in screen_text(app)
+
+
+# -- motion, comparison, settings, pictures -------------------------------------------------------
+
+
+async def test_motion_zooms_and_moves_along(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "m")
+        assert "start-up" in screen_text(app)
+        await press(pilot, "plus", "plus", "right", "right", "home")
+        assert app.screen._zoom == 0
+        await pilot.click("#curves", offset=(60, 10))
+        await settle(pilot)
+        assert app.screen._zoom == 1
+        await press(pilot, "right_square_bracket")
+        assert "marker 2 trunk" in screen_text(app)
+
+
+async def test_the_comparison_shows_overlay_difference_and_verdict(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "c")
+        assert "agrees: the gain is within two" in screen_text(app)
+        assert "camera, over it the sensor" in screen_text(app)
+        await press(pilot, "d")
+        assert "camera − sensor" in screen_text(app)
+
+
+async def test_a_setting_is_changed_checked_and_makes_stale(workspace):
+    folder = workspace / "trials/2026-11-20_T04"
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "s", "ctrl+p", *"setmarkerssize", "down", "enter")
+        field = app.screen.query_one("#value", Input)
+        assert field.value == "60.0"
+        field.value = "wide"
+        await press(pilot, "enter")
+        assert isinstance(app.screen, ErrorScreen)
+        assert Trial.open(folder).settings.markers.size_mm == 60.0
+        await press(pilot, "escape", "enter")
+        app.screen.query_one("#value", Input).value = "45"
+        await press(pilot, "enter")
+        assert Trial.open(folder).settings.markers.size_mm == 45
+        await press(pilot, "escape")
+        assert "the setting markers.size_mm changed" in screen_text(app)
+
+
+async def test_pictures_show_markers_and_step_through_the_recording(workspace):
+    folder = workspace / "trials/2026-11-20_T04"
+    make_video(folder / "left.avi", "ffv1", frames=12, size=(640, 480))
+    make_video(folder / "right.avi", "ffv1", frames=12, size=(640, 480))
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "k")
+        assert "left  frame 0 of 240" in screen_text(app)
+        assert "4 markers" in screen_text(app)
+        await press(pilot, "right", "right", "left")
+        assert "frame 1 of 240" in screen_text(app)
+        await press(pilot, "c")
+        assert "right  frame 1 of 240" in screen_text(app)
+        await press(pilot, "right_square_bracket")
+        assert "marker 2 seen" in screen_text(app)
+        await press(pilot, "pagedown")
+        assert "frame 11 of 240" in screen_text(app)
+        await press(pilot, "home", "space")
+        while app.screen._shot.index < 2:
+            await pilot.pause(0.05)
+        await press(pilot, "space")
+        assert app.screen._playing is None
+
+
+async def test_a_broken_recording_is_told_where_the_picture_would_be(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "k")
+        assert isinstance(app.screen, ErrorScreen)
+        await press(pilot, "escape")
+        assert "is not a video" in screen_text(app)
+
+
+# -- new trials -----------------------------------------------------------------------------------
+
+
+async def test_a_new_trial_is_made_from_two_recordings_by_keys(workspace, tmp_path):
+    raw = tmp_path / "raw"
+    raw.mkdir()
+    for side in ("left", "right"):
+        make_video(raw / f"{side}.avi", frames=5)
+    shutil.copy(workspace / "trials/2026-11-21_T06/shared_rig.toml", raw / "rig.toml")
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "n")
+        assert isinstance(app.screen, NewTrialPage)
+        await press(pilot, *"T07", "enter")
+        app.screen.query_one("#left", Input).value = str(raw / "left.avi")
+        await press(pilot, "enter")
+        assert app.screen.query_one("#right", Input).value == str(raw / "right.avi")
+        assert "left, 128 × 96 px" in str(app.screen.query_one("#left-first").border_title)
+        app.screen.query_one("#rig", Input).value = str(raw / "rig.toml")
+        app.screen.query_one("#band", Input).value = "5-14"
+        await press(pilot, "ctrl+s")
+        assert isinstance(app.screen, TrialPage), screen_text(app)
+    trial = Trial.open(workspace / "trials/T07")
+    assert trial.settings.vibration.band_hz == (5.0, 14.0)
+    assert (raw / "left.avi").is_file()
+
+
+async def test_a_new_trial_that_cannot_be_made_says_why_and_keeps_the_form(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "n", *"T07", "ctrl+s")
+        assert isinstance(app.screen, ErrorScreen)
+        assert "left recording is not named" in screen_text(app)
+        await press(pilot, "escape")
+        assert app.screen.query_one("#trial", Input).value == "T07"
+        assert not (workspace / "trials/T07").exists()
+
+
+async def test_a_file_is_picked_from_the_tree(workspace, tmp_path):
+    make_video(tmp_path / "left.avi", frames=3)
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "n", "tab", "ctrl+o")
+        await pilot.press("backspace")
+        tree = app.screen.query_one("#tree")
+        await settle(pilot)
+        while not tree.root.children:
+            await pilot.pause(0.02)
+        await pilot.press("down", "down", "enter")
+        await settle(pilot)
+        assert app.screen.query_one("#left", Input).value == str(tmp_path / "left.avi")
+        assert app.screen.query_one("#left-first", Picture)._shown is not None
+
+
+# -- everywhere -----------------------------------------------------------------------------------
+
+
+async def test_an_empty_folder_says_what_to_do_first(tmp_path):
+    async with started(tmp_path, (80, 24)) as (app, pilot):
+        assert "is no workspace yet" in screen_text(app)
+        assert "make a trial from two recordings" in screen_text(app)
+        await press(pilot, "r", "enter", "v", "l", "q")
+    assert list(tmp_path.iterdir()) == []
+
+
+async def test_help_footer_and_palette_on_every_screen(workspace):
+    async with started(workspace, (80, 24)) as (app, pilot):
+        for keys in ("", "enter", "v", "escape m", "escape c", "escape e", "escape s"):
+            await press(pilot, *keys.split())
+            await look_around(app, pilot)
+        await press(pilot, "escape", "escape", "n")
+        await look_around(app, pilot)
+
+
+async def look_around(app, pilot) -> None:
+    """At most seven keys in the footer; help and palette open and close."""
+    name = app.screen.NAME
+    footer = [b for b in app.screen.active_bindings.values() if b.binding.show and b.enabled]
+    assert len({b.binding.action for b in footer}) <= 6  # and the palette's key makes seven
+    footer_end = app.screen.query("FooterKey").last().region
+    assert footer_end.right <= app.size.width
+    await press(pilot, "f1")
+    assert f"Help: {name}" in screen_text(app)
+    await press(pilot, "escape", "ctrl+p")
+    assert "Search for commands" in screen_text(app)
+    await press(pilot, "escape")
+    assert name == app.screen.NAME
+
+
+async def test_jump_mode_reaches_panes_by_letter(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "j")
+        assert "press a letter" in screen_text(app)
+        await press(pilot, "f")
+        assert app.focused.id == "facts"
+        await press(pilot, "j", "escape")
+        assert app.focused.id == "facts"
+
+
+async def test_the_palette_opens_a_trial_by_name(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "ctrl+p", *"opent05", "down", "enter")
+        assert isinstance(app.screen, TrialPage)
+        assert app.screen.folder.name == "2026-11-20_T05"
+
+
+async def test_search_narrows_the_list_and_escape_ends_it(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "slash", *"warn", "enter")
+        table = app.screen.query_one("#trials", DataTable)
+        assert table.row_count == 1
+        await press(pilot, "escape")
+        assert table.row_count == 3
+        assert app.focused is table
+
+
+async def test_theme_trial_screen_and_marker_are_kept(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "l", "enter", "v", "right_square_bracket")
+        assert app.theme == SUNLIGHT
+    async with started(workspace) as (app, pilot):
+        assert app.theme == SUNLIGHT
+        assert isinstance(app.screen, ResultsPage)
+        assert "▶2 trunk" in screen_text(app)
+        await press(pilot, "l", "escape", "escape")
+        assert app.theme == DARK
+        assert isinstance(app.screen, TrialsPage)
+
+
+async def test_the_mouse_alone_reaches_results(workspace):
+    async with started(workspace) as (app, pilot):
+        await pilot.click("#trials", offset=(6, 2))
+        await settle(pilot)
+        assert isinstance(app.screen, TrialPage)
+        keys = app.screen.query("FooterKey")
+        await pilot.click(next(k for k in keys if k.key == "v"))
+        await settle(pilot)
+        assert isinstance(app.screen, ResultsPage)
+        await pilot.click("#title")
+        await settle(pilot)
+        assert isinstance(app.screen, TrialPage)
+
+
+EVIL = "[red]x[b] \x1b[31m\u202e\u200b" + "橄" * 40
+
+
+async def test_hostile_names_and_metadata_are_shown_harmless(workspace):
+    folder = workspace / "trials" / EVIL
+    toml = scene.TOML.replace('"Bari, plot 7"', '"""\\u001b[2J[b]' + "A" * 10_000 + '"""')
+    scene.new_trial(folder, toml)
+    (workspace / "trials" / "broken\x07").mkdir()
+    (workspace / "trials" / "broken\x07" / "trial.toml").write_text("[x\x1b", encoding="utf-8")
+    for size in ((120, 40), (80, 24)):
+        shutil.rmtree(workspace / ".olivevib", ignore_errors=True)
+        async with started(workspace, size) as (app, pilot):
+            text = screen_text(app)
+            assert "[red]x[b]" in text
+            assert "unreadable" in text
+            await press(pilot, "end", "up", "up", "enter", "s", "escape", "escape", "down", "enter")
+            assert not any(ord(c) < 32 for c in screen_text(app).replace("\n", ""))
+            await press(pilot, "escape", "ctrl+p", *"open")
+            assert not any(ord(c) < 32 for c in screen_text(app).replace("\n", ""))
+
+
+async def test_a_damaged_result_is_told_and_the_app_lives_on(workspace):
+    place = workspace / "trials/2026-11-20_T04/vibration.h5"
+    place.write_bytes(place.read_bytes()[:-300])
+    async with started(workspace) as (app, pilot):
+        assert "stale" in screen_text(app)
+        await press(pilot, "enter")
+        assert "vibration.h5 is damaged" in words(app, "#warning-text")
+        await press(pilot, "v")
+        assert isinstance(app.screen, ErrorScreen)
+        assert "vibration.h5 is damaged" in words(app, ".dialog > Static")
+        await press(pilot, "escape", "escape", "escape")
+        assert isinstance(app.screen, TrialsPage | TrialPage)
+
+
+def test_the_cli_refuses_without_a_terminal(capsys):
+    from olivevib.cli import main
+
+    assert main([]) == 2
+    assert "needs a terminal" in capsys.readouterr().err
+
+
+def test_input_errors_have_remedies():
+    assert InputError("a", "b", "c").remedy == "c"
