@@ -209,3 +209,13 @@ def test_procrustes_takes_the_smallest_turn_on_straight_motion():
     assert gain == pytest.approx(2.0)
     np.testing.assert_allclose(turn @ [0, 0, 1], [0, 0, 1], atol=1e-12)
     assert np.linalg.det(turn) == pytest.approx(1.0)
+
+
+def test_a_sensor_of_one_axis_gives_the_clock_but_no_gain():
+    optical, accelerometer, _ = scene(14)
+    values = accelerometer.values.copy()
+    values[:, 1:] = np.nan
+    c = compare(optical, acceleration(accelerometer.t_s, values), 1, "trunk", SETTINGS)
+    assert c.verdict is Verdict.UNDECIDED
+    assert "1 of three axes" in c.reason
+    assert abs(c.clock_offset_s - 0.2) < 0.03  # a phase of the orbit looks like a lag

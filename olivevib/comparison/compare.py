@@ -49,6 +49,7 @@ def compare(
     if optical.unit != "mm" or len(optical.axes) != 3:
         raise ValueError(f"marker {marker}: need three axes in mm, got {optical.unit}")
     camera_s, camera_mm = measured(optical)
+    sensor, missing = _axes_that_are(sensor)
     tick(0, 4, "displacement from the accelerometer")
     motion = sensor_motion(sensor, settings.corner_hz)
     empty = _Outcome.of(marker, sensor_name)
@@ -60,13 +61,23 @@ def compare(
     tick(1, 4, "lines of the accelerometer")
     lines = sensor_lines(sensor, 1.5 * settings.corner_hz)
     tick(2, 4, "lag between the clocks")
-    work = _Work(camera_s, camera_mm, motion, lines, settings)
+    work = _Work(camera_s, camera_mm, motion, lines, settings, missing)
     lag = work.coarse(limits)
     tick(3, 4, "clock, gain and rotation")
     seen, clock = work.refined(lag.offset_s)
     if seen.t_s.size < _FEWEST:
         return empty.undecided("Too few frames lie inside the accelerometer's record.")
     return _comparison(empty, work, lag, seen, clock, work.differences(sensor, clock))
+
+
+def _axes_that_are(sensor: Samples) -> tuple[Samples, int]:
+    """The sensor with axes that it does not have (NaN throughout) taken as still, and how many."""
+    missing = np.isnan(sensor.values).all(axis=0) if sensor.t_s.size else np.zeros(3, bool)
+    if not missing.any() or missing.all():
+        return sensor, 0
+    values = np.where(missing, 0.0, sensor.values)
+    whole = Samples(sensor.t_s, values, sensor.quantity, sensor.unit, sensor.axes)
+    return whole, int(missing.sum())
 
 
 @dataclass(frozen=True)
@@ -76,6 +87,7 @@ class _Work:
     motion: SensorMotion
     lines: LineFit
     settings: ComparisonSettings
+    missing_axes: int
 
     @property
     def rate_hz(self) -> float:
@@ -299,6 +311,12 @@ def _coherence(optical: Floats, residual: Floats) -> float:
 
 def _verdict(work: _Work, lag: CoarseLag, clock: ClockFit, coherence: float) -> tuple[Verdict, str]:
     r = float(np.sqrt(coherence)) if np.isfinite(coherence) else 0.0
+    if work.missing_axes and r > 0.5:
+        return Verdict.UNDECIDED, (
+            f"The accelerometer has {3 - work.missing_axes} of three axes: the clocks are "
+            f"compared (correlation {r:.2f}), but a gain of {clock.gain:.3f} may be the angle "
+            "between its axes and the motion."
+        )
     if r < _RESEMBLES:
         if lag.peak - lag.second_peak < _CLOSE or r < 0.5:
             return Verdict.UNDECIDED, (

@@ -2,27 +2,57 @@
 
 from olivevib.vibration.analysis import VibrationSettings, analyse
 from olivevib.vibration.figures import Figures
+from olivevib.vibration.fixed import without_camera_motion
+from olivevib.vibration.kinematics import to_displacement
 from olivevib.vibration.line import LineSettings, dominant_line
+from olivevib.vibration.modal import Decay, fit_decay
 from olivevib.vibration.motion import CandidateMotion, MarkerMotion, Vibration
+from olivevib.vibration.orbit import Orbit, Precession, orbit, precession
 from olivevib.vibration.phases import Phase, PhaseSettings, find_phases, find_sensor_phases
+from olivevib.vibration.ridge import Ridge, camera_ridge, sensor_ridge
+from olivevib.vibration.transfer import (
+    Deflection,
+    LineRatio,
+    Response,
+    deflection_shape,
+    frequency_response,
+    line_ratio,
+)
 from olivevib.vibration.types import Line, LineStatus, Spectrum
 from olivevib.vibration.verdict import SamplingFacts
 
 __all__ = [
     "CandidateMotion",
+    "Decay",
+    "Deflection",
     "Figures",
     "Line",
+    "LineRatio",
     "LineSettings",
     "LineStatus",
     "MarkerMotion",
+    "Orbit",
     "Phase",
     "PhaseSettings",
+    "Precession",
+    "Response",
+    "Ridge",
     "SamplingFacts",
     "Spectrum",
     "Vibration",
     "VibrationSettings",
     "analyse",
+    "camera_ridge",
+    "deflection_shape",
     "dominant_line",
     "find_phases",
     "find_sensor_phases",
+    "fit_decay",
+    "frequency_response",
+    "line_ratio",
+    "orbit",
+    "precession",
+    "sensor_ridge",
+    "to_displacement",
+    "without_camera_motion",
 ]

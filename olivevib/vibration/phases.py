@@ -79,6 +79,7 @@ class _Track:
 
 _CAMERA_TRACK = _Track(0.15, 0.2, plateau=True)
 _SENSOR_TRACK = _Track(0.1, 0.0, plateau=False)
+_RUNNING = 0.35  # of the usual RMS: less is a ramp at the machine's frequency; beats stay above
 _QUIET = 0.25  # of the 90th percentile: below, a window may be rest
 
 
@@ -207,7 +208,8 @@ def _steady(ridge: Ridge, on: Bools, tolerance_hz: float, settings: PhaseSetting
         return None
     middle = float(np.median(ridge.f_hz[strong]))
     allowed = max(tolerance_hz, settings.steady_percent / 100 * middle)
-    run = _longest(on & (np.abs(ridge.f_hz - middle) <= allowed))
+    full = ridge.rms > _RUNNING * np.median(ridge.rms[strong])
+    run = _longest(on & full & (np.abs(ridge.f_hz - middle) <= allowed))
     if run is None or (run.stop - run.start) * ridge.hop_s < settings.shortest_s:
         return None
     return run

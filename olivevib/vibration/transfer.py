@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import fft
 
 from olivevib.arrays import Floats, floats
@@ -145,3 +147,40 @@ def _segments(values: Floats, starts: np.ndarray, segment: int, w: Floats) -> np
     frames = values[starts[:, None] + np.arange(segment)]
     frames = frames - frames.mean(axis=1, keepdims=True)
     return np.asarray(fft.rfft(frames * w, axis=1))
+
+
+@dataclass(frozen=True)
+class Deflection:
+    """Operating deflection shape: complex amplitude (M, 3) of each marker at their common line.
+
+    All at one instant, turned so that the largest is real: markers move as Re(shape exp(i w t)).
+    """
+
+    ids: tuple[int, ...]
+    f_hz: float
+    shape: NDArray[np.complex128]
+    unit: str
+
+
+def deflection_shape(lines: Mapping[int, Line]) -> Deflection | None:
+    """The shape in which markers move at their common line; None without two of them.
+
+    Markers whose line lies more than three sigma from the weighted mean frequency are left out.
+    Valid whatever alias is the true one, but for the sense in time (an odd fold conjugates it).
+    """
+    known = {m: x for m, x in sorted(lines.items()) if np.isfinite(x.amplitude).all()}
+    if len(known) < 2:
+        return None
+    weights = np.array([1.0 / max(x.f_sigma_hz, 1e-12) ** 2 for x in known.values()])
+    f = float(np.sum(weights * [x.f_hz for x in known.values()]) / weights.sum())
+    alike = {m: x for m, x in known.items() if abs(x.f_hz - f) <= 3 * x.f_sigma_hz + 1e-9 * f}
+    if len(alike) < 2:
+        return None
+    start = next(iter(alike.values())).t_ref_s
+    rows = [
+        complex_amplitude(x) * np.exp(2j * np.pi * f * (start - x.t_ref_s)) for x in alike.values()
+    ]
+    shape = np.array(rows)
+    largest = shape.ravel()[int(np.argmax(np.abs(shape)))]
+    unit = next(iter(alike.values())).unit
+    return Deflection(tuple(alike), f, shape * np.exp(-1j * np.angle(largest)), unit)
