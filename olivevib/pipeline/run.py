@@ -6,12 +6,14 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from olivevib.errors import Caution, OlivevibError
+from olivevib.files.lock import alone_in
 from olivevib.pipeline.calibrate import calibrate
 from olivevib.pipeline.compare import compare
 from olivevib.pipeline.measure import analyse, reconstruct
 from olivevib.pipeline.track import track
 from olivevib.progress import Tick, silent
 from olivevib.trial import STAGES, Condition, Trial
+from olivevib.trial.fingerprints import PRIVATE
 from olivevib.trial.stages import BY_NAME, failure_file, write_failure
 
 Verb = Callable[[Trial, Tick], tuple[Caution, ...]]
@@ -35,7 +37,15 @@ class Outcome:
 
 
 def run_stage(trial: Trial, stage: str, tick: Tick = silent) -> tuple[Caution, ...]:
-    """Run one stage, whatever its state; a failure is kept beside the trial and raised."""
+    """Run one stage, whatever its state; a failure is kept beside the trial and raised.
+
+    UsageError where another process is at work on the trial.
+    """
+    with alone_in(trial.folder, PRIVATE):
+        return _run_stage(trial, stage, tick)
+
+
+def _run_stage(trial: Trial, stage: str, tick: Tick) -> tuple[Caution, ...]:
     now = trial.fingerprint(stage)
     try:
         cautions = VERBS[stage](trial, tick)
@@ -49,13 +59,19 @@ def run_stage(trial: Trial, stage: str, tick: Tick = silent) -> tuple[Caution, .
 def run(trial: Trial, tick: Tick = silent) -> Iterator[Outcome]:
     """Run every stage that is missing, stale or failed, in order; yields what became of each.
 
-    The first failure ends it (raised); what earlier stages wrote stays.
+    The first failure ends it (raised); what earlier stages wrote stays. UsageError where another
+    process is at work on the trial.
     """
+    with alone_in(trial.folder, PRIVATE):
+        yield from _stages(trial, tick)
+
+
+def _stages(trial: Trial, tick: Tick) -> Iterator[Outcome]:
     for stage in STAGES:
         trial = trial.reopen()
         state = trial.states()[stage.name]
         if state.state in TO_DO:
-            yield Outcome(stage.name, "done", run_stage(trial, stage.name, tick))
+            yield Outcome(stage.name, "done", _run_stage(trial, stage.name, tick))
         elif state.state is Condition.BLOCKED:
             trial.fingerprint(stage)  # names the input that is missing
             yield Outcome(stage.name, f"blocked: {state.reason}")
