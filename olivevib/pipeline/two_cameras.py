@@ -1,4 +1,8 @@
-"""Both cameras at once: one thread each reads and measures, one place collects and can cancel."""
+"""Both cameras at once: one thread each reads and measures, one place collects and can cancel.
+
+A process that was told to use one core (``cv2.setNumThreads(1)``, as batch does with its workers)
+takes a frame of each camera in turn instead: several of them then share the cores without loss.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,8 @@ import queue
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from typing import Generic, TypeVar
+
+import cv2
 
 from olivevib.progress import Tick
 
@@ -59,23 +65,35 @@ def both(
     after each item; when it raises, both threads are stopped and joined before it goes on. An
     error of a camera is raised here, after what both cameras delivered was collected.
     """
+
+    def take(side: str, item: Item) -> None:
+        nonlocal done
+        collect(side, item)
+        done += 1
+        tick(done, total, note)
+
+    tick(done, total, note)
+    if cv2.getNumThreads() > 1:
+        _in_threads(makers, take)
+    else:
+        _in_turn(makers, take)
+
+
+def _in_threads(
+    makers: Mapping[str, Callable[[], Iterator[Item]]], take: Callable[[str, Item], None]
+) -> None:
     workers = [_Worker(side, make) for side, make in makers.items()]
     for worker in workers:
         worker.thread.start()
     running = list(workers)
     try:
-        tick(done, total, note)
         while running:
             for worker in list(running):
                 item = _next(worker)
-                if item is _NOTHING:
-                    continue
                 if item is None:
                     running.remove(worker)
-                    continue
-                collect(worker.side, item)  # type: ignore[arg-type]
-                done += 1
-                tick(done, total, note)
+                elif item is not _NOTHING:
+                    take(worker.side, item)  # type: ignore[arg-type]
     finally:
         for worker in workers:
             worker.stop.set()
@@ -84,6 +102,29 @@ def both(
     for worker in workers:
         if worker.error is not None:
             raise worker.error
+
+
+def _in_turn(
+    makers: Mapping[str, Callable[[], Iterator[Item]]], take: Callable[[str, Item], None]
+) -> None:
+    walks = {side: make() for side, make in makers.items()}
+    errors: list[Exception] = []
+    try:
+        while walks:
+            for side in list(walks):
+                try:
+                    item = next(walks[side])
+                except StopIteration:
+                    del walks[side]
+                except Exception as error:  # raised below, once the other camera is through
+                    errors.append(error)
+                    del walks[side]
+                else:
+                    take(side, item)
+    finally:
+        walks.clear()  # closes the recordings also where the tick has raised
+    if errors:
+        raise errors[0]
 
 
 _NOTHING = object()
