@@ -296,6 +296,22 @@ async def test_a_setting_is_changed_checked_and_makes_stale(workspace):
         assert "the setting markers.size_mm changed" in screen_text(app)
 
 
+async def test_an_accelerometer_is_bound_to_a_marker(workspace):
+    folder = workspace / "trials/2026-11-20_T05"
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "down", "enter", "s", "ctrl+p", *"setaccelerometers", "down", "enter")
+        app.screen.query_one("#value", Input).value = '[{file = "accelerometer.csv", marker = 5}]'
+        await press(pilot, "enter", "escape")
+        assert [(a.file, a.marker) for a in Trial.open(folder).settings.accelerometers] == [
+            ("accelerometer.csv", 5)
+        ]
+        assert "○ missing" in screen_text(app)
+        await press(pilot, "s", "ctrl+p", *"setaccelerometers", "down", "enter")
+        app.screen.query_one("#value", Input).value = ""
+        await press(pilot, "enter", "escape")
+        assert Trial.open(folder).settings.accelerometers == ()
+
+
 async def test_pictures_show_markers_and_step_through_the_recording(workspace):
     folder = workspace / "trials/2026-11-20_T04"
     make_video(folder / "left.avi", "ffv1", frames=12, size=(640, 480))

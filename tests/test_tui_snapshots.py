@@ -42,7 +42,7 @@ def made(tmp_path_factory) -> Path:
     folder = scene.workspace(tmp_path_factory.mktemp("snap") / "olive")
     for side in ("left", "right"):
         place = folder / "trials/2026-11-20_T04" / f"{side}.avi"
-        make_video(place, "ffv1", frames=2, size=(640, 480))
+        make_video(place, "ffv1", frames=2, pixels="gray", size=(640, 480))
     scene.remeasure(folder / "trials/2026-11-20_T04")
     return folder
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -292,3 +294,12 @@ def test_kept_file_is_plain_json(tmp_path):
     (tmp_path / "trials").mkdir()
     write_kept(tmp_path, Kept())
     assert json.loads(place_of(tmp_path).read_text(encoding="utf-8"))["marker"] == -1
+
+
+def test_the_first_picture_waits_for_nothing_heavy():
+    heavy = ("numpy", "scipy", "cv2", "h5py", "pandas", "matplotlib", "pydantic", "av")
+    code = f"import sys, olivevib.tui.app; print(*[m for m in {heavy!r} if m in sys.modules])"
+    found = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert found == []

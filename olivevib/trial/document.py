@@ -20,6 +20,7 @@ from olivevib.trial.settings import TrialSettings
 FILE = "trial.toml"
 REMEDY = "Correct the file with any text editor and run again; nothing that was measured is lost."
 LARGEST_BYTES = 1_000_000
+LIST_OF_TABLES = "accelerometers"  # set as a whole: [{file = "…", marker = 1}]
 
 
 def read_settings(folder: Path) -> TrialSettings:
@@ -103,7 +104,7 @@ def _load(path: Path) -> tomlkit.TOMLDocument:
 
 def _set(document: tomlkit.TOMLDocument, dotted: str, value: Any) -> None:
     *tables, key = dotted.split(".")
-    if not tables:
+    if not tables and key != LIST_OF_TABLES:
         raise UsageError(f"{dotted!r} names no setting.", "", "Write it as table.key=value.")
     table: Any = document
     for name in tables:

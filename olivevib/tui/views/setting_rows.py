@@ -89,4 +89,5 @@ def change_of(row: SettingRow, text: str) -> dict[str, Any]:
 
     if not text.strip():
         return {row.key: None}
-    return settings([f"{row.key}={text.strip()}"])
+    (value,) = settings([f"the.value={text.strip()}"]).values()
+    return {row.key: value}

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rich.style import Style
 from rich.text import Text
 
-from olivevib.comparison import Comparison
 from olivevib.tui.harmless import harmless, plain
 from olivevib.tui.views.palette import Palette
 from olivevib.tui.views.words import GLYPHS, marker_frequency, number, short
+
+if TYPE_CHECKING:
+    from olivevib.comparison import Comparison
 
 STATE_MEANINGS = {"done": "good", "stale": "warn", "failed": "bad", "blocked": "warn"}
 QUALITY_MEANINGS = {
@@ -98,7 +100,7 @@ def _calibration(c: Mapping[str, Any]) -> list[str]:
         share = number(c["holdout_rms_percent"], 2, "%")
         lines.append(f"distances on unused views {number(c['holdout_rms_mm'], 3, 'mm')} ({share})")
     if c["verdict"]:
-        lines.append(harmless(c["verdict"], 300))
+        lines.append(harmless(c["verdict"], 600))
     return lines
 
 
@@ -170,7 +172,7 @@ def not_compared_text(summary: Mapping[str, Any], palette: Palette) -> Text:
 
 
 def _with_sigma(value: float, sigma: float, unit: str) -> str:
-    if not np.isfinite(value):
+    if not math.isfinite(value):
         return "not known"
-    spread = f" ± {sigma:.2g}" if np.isfinite(sigma) else ""
+    spread = f" ± {sigma:.2g}" if math.isfinite(sigma) else ""
     return f"{value:.5g}{spread}{f' {unit}' if unit else ''}"
