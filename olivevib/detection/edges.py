@@ -18,6 +18,8 @@ STEP_PX = 0.25  # distance of samples on a scan line
 CORRELATION = 2.0  # scan lines 1 px apart share pixels: their errors count about half
 TUKEY = 4.685  # robust tuning constant, 95 % efficiency
 NOISE_FLOOR_PX = 0.02  # smallest believed scatter of an edge point (8-bit rounding, texture)
+ROOMY_PX = 6.5  # from this module width on the whole slope counts, and the pixel grid hardly
+GRID_SIGMA_PX = {True: 0.012, False: 0.006}  # what the pixel grid does to a whole side
 ROUGH_PX = 0.4  # an edge whose points scatter more is covered or not straight
 CROWDED_PX = 3.5  # below this module width neighbouring edges pull: a bias sigma is added
 CROWDED_SIGMA = 0.06  # px of bias sigma per px of missing module width (rendered scenes)
@@ -85,24 +87,32 @@ def _side(grey: Grey, start: Floats, end: Floats, far: Floats, modules: int) -> 
     t = np.linspace(-half, half, max(6, int(2 * half) + 1))
     base = (start + end) / 2
     wide = float(np.clip(0.7 * module, reach, 4.0))  # the start may be off by a pixel or two
-    first = _offsets(grey, base[None] + t[:, None] * along, normal, wide)
+    first = _offsets(grey, base[None] + t[:, None] * along, normal, wide, True)
     line = _line(t, first) if first is not None else None
     if line is None:
         return None
     a, b, _, _ = line
     moved = base + a * normal
     turned = np.array([along + b * normal, normal - b * along]) / np.hypot(1.0, b)
-    again = _offsets(grey, moved[None] + t[:, None] * turned[0], turned[1], reach)
+    clipped = module < ROOMY_PX
+    again = _offsets(grey, moved[None] + t[:, None] * turned[0], turned[1], reach, clipped)
     line = _line(t, again) if again is not None else None
     if line is None or line[3] > ROUGH_PX:
         return None
     a, b, covariance, rms = line
     covariance[0, 0] += (CROWDED_SIGMA * max(0.0, CROWDED_PX - module)) ** 2
+    covariance[0, 0] += GRID_SIGMA_PX[clipped] ** 2
     return _Side(moved, turned[0], turned[1], a, b, covariance, rms)
 
 
-def _offsets(grey: Grey, feet: Floats, normal: Floats, reach: float) -> Floats | None:
-    """Edge position on the scan line through each of ``feet`` (N, 2), px; NaN where unclear."""
+def _offsets(
+    grey: Grey, feet: Floats, normal: Floats, reach: float, clipped: bool
+) -> Floats | None:
+    """Edge position on the scan line through each of ``feet`` (N, 2), px; NaN where unclear.
+
+    The centroid of the grey slope; ``clipped`` leaves out the weak part of it, where other edges
+    are near. That costs linearity: the position then depends a little on the pixel grid.
+    """
     s = np.arange(-reach - STEP_PX / 2, reach + STEP_PX, STEP_PX)
     points = feet[:, None, :] + s[None, :, None] * normal
     height, width = grey.shape
@@ -114,7 +124,9 @@ def _offsets(grey: Grey, feet: Floats, normal: Floats, reach: float) -> Floats |
         slope = -slope
     centre = (s[:-1] + s[1:]) / 2
     step = slope.sum(axis=1)
-    weight = np.clip(slope - 0.1 * slope.max(axis=1, keepdims=True), 0, None)
+    weight = slope
+    if clipped:
+        weight = np.clip(slope - 0.1 * slope.max(axis=1, keepdims=True), 0, None)
     total = weight.sum(axis=1)
     good = (step > 0.4 * np.median(step)) & (step > 8) & (total > 0)
     where = (weight @ centre) / np.where(total > 0, total, 1.0)
