@@ -23,7 +23,7 @@ $(VENV)/ready: requirements-dev.txt pyproject.toml
 	@touch $@
 
 demo: $(VENV)/ready
-	$(BIN)/olivevib demo
+	$(BIN)/olivevib demo || [ $$? -eq 3 ]
 
 test: $(VENV)/ready
 	$(BIN)/pytest -m "not slow" -n 2
@@ -42,7 +42,10 @@ check: $(VENV)/ready-check lint
 	$(BIN)/pytest -n 2
 
 sample: $(VENV)/ready
-	$(BIN)/python -m olivevib.simulation.sample
+	rm -rf trials/sample trials/sample-truth
+	$(BIN)/olivevib simulate trials/sample --scenario sample
+	$(BIN)/olivevib run sample || [ $$? -eq 3 ]
+	$(BIN)/olivevib report sample -o reports
 
 requirements:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --extra test pyproject.toml -o requirements-dev.txt

@@ -49,6 +49,7 @@ class NewTrial:
     accelerometer_marker: int | None = None
     link: bool = False
     simulated: bool = False
+    exposure_ms: float | None = None
     places: Mapping[int, str] = field(default_factory=dict)
     sizes_mm: Mapping[int, float] = field(default_factory=dict)
 
@@ -256,7 +257,12 @@ def _cameras(plan: NewTrial, places: _Places) -> Table:
         video = getattr(plan, side)
         stamps = _stamps(plan, places, side)
         table[side] = _table(
-            {"video": places.get(video), "stamps": stamps, "row_time_us": row_time}
+            {
+                "video": places.get(video),
+                "stamps": stamps,
+                "row_time_us": row_time,
+                "exposure_ms": plan.exposure_ms,
+            }
         )
     return table
 

@@ -60,6 +60,7 @@ def plan_of(recorded: SimulatedTrial) -> NewTrial:
         band_hz=recorded.band_hz,
         accelerometer=str(recorded.accelerometer) if recorded.accelerometer else None,
         accelerometer_marker=recorded.accelerometer_marker,
+        exposure_ms=recorded.exposure_ms,
         simulated=True,
         places=recorded.places,
         sizes_mm=recorded.sizes_mm,

@@ -147,9 +147,9 @@ DEMO = Scenario(
 
 SAMPLE = Scenario(
     "sample",
-    "six ArUco markers on a shaken tree, 12 Hz, cameras in step, global shutter, 3 s, small files",
+    "six ArUco markers on a shaken tree, 11.3 Hz, cameras in step, global shutter, 3 s, small files",
     3.0,
-    Shaking(12.07, Phases(0.4, 0.35, 2.55, 0.2), sway_mm=0.6, decay_mm=2.0),
+    Shaking(11.3, Phases(0.4, 0.35, 2.55, 0.2), sway_mm=0.6, decay_mm=2.0),
     (5.0, 14.0),
     markers=MarkerPlan("aruco:DICT_4X4_50", (1, 2, 3, 4, 5, 6), (66.0, 74.0), (0.0, 35.0)),
     board=BoardPlan("charuco:7x5,square=50,marker=35,dict=DICT_5X5_50", 14, None, (800.0, 1250.0)),
