@@ -35,10 +35,12 @@ def shape_of(views: Sequence[BoardView]) -> BoardShape:
 class Side:
     """One camera's views: its model (size, row time), whether stamps make tracks in time.
 
-    reference_row is the row at which stamps hold; row_time_s the row time used in the tracks.
+    views are those that count; track_views all that were found, for the tracks; reference_row is
+    the row at which stamps hold; row_time_s the row time used in the tracks.
     """
 
     views: tuple[BoardView, ...]
+    track_views: tuple[BoardView, ...]
     camera: CameraModel
     timed: bool
     reference_row: float
@@ -46,12 +48,19 @@ class Side:
 
     def samples(self) -> Samples:
         """The corner tracks of this camera."""
-        return tabulate(self.views, self.row_time_s, self.reference_row)
+        return tabulate(self.track_views, self.row_time_s, self.reference_row)
 
     def with_scale(self, scale: float) -> Side:
         """The same views, every sigma times ``scale``."""
-        views = tuple(replace(v, sigma_px=v.sigma_px * scale) for v in self.views)
-        return replace(self, views=views)
+        a, b = (
+            tuple(replace(view, sigma_px=view.sigma_px * scale) for view in views)
+            for views in (self.views, self.track_views)
+        )
+        return replace(self, views=a, track_views=b)
+
+    def only(self, keep: Sequence[int]) -> Side:
+        """The views ``keep`` alone count; the tracks stay."""
+        return replace(self, views=tuple(self.views[k] for k in keep))
 
 
 @dataclass(frozen=True)
@@ -113,6 +122,7 @@ def _observations(
         sigma_px=table.sigma_px,
         centre_mm=shape.centre_mm,
         half_mm=shape.half_mm,
+        poses=int(pose.max(initial=-1)) + 1,
     )
 
 
@@ -125,6 +135,7 @@ def join(parts: Sequence[Observations]) -> Observations:
         parts[0],
         **{name: array[order] for name, array in arrays.items()},
         row_time_s=np.sum([part.row_time_s for part in parts[:2]], axis=0),
+        poses=max(part.poses for part in parts),
     )
 
 

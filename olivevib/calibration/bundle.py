@@ -71,7 +71,7 @@ class Observations:
     track (N, m, 2): the image point as a polynomial in time, px/s^k (stills: only the first row); for
     RIGHT in the lag, else about the view's own instant; row (N,): sensor rows below the reference
     row; row_time_s (2,): the row times with which the tracks were made; sigma_px (N,);
-    centre_mm (2,) and half_mm scale the bow.
+    centre_mm (2,) and half_mm scale the bow; poses: number of board poses, seen or not.
     """
 
     chain: Ints
@@ -84,11 +84,7 @@ class Observations:
     sigma_px: Floats
     centre_mm: Floats
     half_mm: float
-
-    @property
-    def poses(self) -> int:
-        """Number of board poses."""
-        return int(self.pose.max()) + 1 if self.pose.size else 0
+    poses: int
 
     @property
     def camera(self) -> Ints:

@@ -1,8 +1,8 @@
 """Board points to a few hundredths of a pixel: each patch of the print fitted to the image.
 
-A point is moved until the printed pattern around it, drawn through the board's homography and
-blurred as the camera blurs, explains the grey values best (least squares with Tukey weights; gain
-and offset per patch). Markers within the patch help instead of pulling, as they do with cornerSubPix.
+A point is moved until the printed pattern around it, drawn through the board's homography (bent as
+the lens bends it) and blurred as the camera blurs, explains the grey values best
+(least squares with Tukey weights; gain and offset are planes over a patch). Markers within the patch help instead of pulling, as they do with cornerSubPix.
 Source: Lucas & Kanade, An iterative image registration technique, 1981; knowledge/detection 4.4.
 """
 
@@ -16,11 +16,13 @@ import numpy as np
 
 from olivevib.arrays import Bools, Floats, Grey, Ints
 from olivevib.calibration.artwork import Artwork, Image
-from olivevib.geometry import apply_homography, homography, homography_jacobian
+from olivevib.calibration.warp import Warp, bent_warp
 
-BLURS_PX = (0.5, 0.9, 1.5, 2.5)  # Gaussian blur of the camera, one is chosen a view
-MOST_PIXELS = 10_000  # of one view; larger patches are thinned
+BLURS_PX = (0.5, 0.9, 1.8)  # Gaussian blur of the camera, one is chosen a view
+MOST_PIXELS = 12_000  # of one view; larger patches are cut down, but not below the next
+LEAST_PER_POINT = 400
 FLOOR_PX = 0.02  # what no template knows: sharpening, compression, print
+LEAST_PIXELS = 25  # of a patch
 LEAST_NCC = 0.75
 LEAST_GAIN = 10.0  # grey levels between white and black
 OUTLIER_PX = 1.5  # from the other points' homography; lenses bend by less across a patch
@@ -43,7 +45,13 @@ class _Patches:
     point: Ints
     grey: Floats
     board_mm: Floats  # (M, 2) under the homography, before the points move
-    by_px: Floats  # (M, 2, 2) d board / d pixel
+    local: Floats  # (M, 2) the same from the middle of the patch, in units of its reach
+    by_px: Floats  # (M, 4) d board / d pixel: xx, xy, yx, yy
+
+    @property
+    def count(self) -> Floats:
+        """Pixels (N,) of each patch."""
+        return np.diff(np.append(self.start, self.point.size)).astype(np.float64)
 
     def sums(self, columns: Floats) -> Floats:
         """Sums (N, C) over the pixels of each point of ``columns`` (M, C)."""
@@ -58,61 +66,49 @@ def refine(grey: Grey, artwork: Artwork, board_mm: Floats, px: Floats, reach_mm:
     """
     n = len(px)
     start = Fitted(px, np.full(n, np.nan), np.ones(n, dtype=np.bool_))
-    first = _round(grey, artwork, board_mm, start, reach_mm, _rough)
+    first = _round(_Task(grey, artwork, board_mm, reach_mm, MOST_PIXELS // 2), start, _rough)
     if first.ok.sum() < 4:
         return first
-    H = robust_homography(board_mm[first.ok], first.px[first.ok])
-    predicted = apply_homography(H, board_mm)
+    predicted = bent_warp(board_mm[first.ok], first.px[first.ok]).forward(board_mm)
     far = np.linalg.norm(first.px - predicted, axis=1) > OUTLIER_PX
     again = np.where((far | ~first.ok)[:, None], predicted, first.px)
     begin = Fitted(again, first.sigma_px, first.ok & ~far)
-    second = _round(grey, artwork, board_mm, begin, reach_mm, _fine)
+    second = _round(_Task(grey, artwork, board_mm, reach_mm, MOST_PIXELS), begin, _fine)
     stray = np.linalg.norm(second.px - predicted, axis=1) > 2 * OUTLIER_PX
     return Fitted(second.px, second.sigma_px, second.ok & ~stray)
 
 
-def robust_homography(board_mm: Floats, px: Floats) -> Floats:
-    """Board to image from points of which a few may be wrong; drops those beyond 4 medians."""
-    keep = np.ones(len(px), dtype=np.bool_)
-    H = homography(board_mm, px)
-    for _ in range(5):
-        miss = np.linalg.norm(apply_homography(H, board_mm) - px, axis=1)
-        keep = miss <= max(4 * float(np.median(miss)), 0.3)
-        if keep.sum() < 4 or keep.all():
-            break
-        H = homography(board_mm[keep], px[keep])
-    return H
+@dataclass(frozen=True)
+class _Task:
+    grey: Grey
+    artwork: Artwork
+    board_mm: Floats
+    reach_mm: Floats
+    pixels: int
 
 
 def _round(
-    grey: Grey,
-    artwork: Artwork,
-    board_mm: Floats,
-    start: Fitted,
-    reach_mm: Floats,
-    fit: Callable[[Artwork, _Patches, float], _Descent],
+    task: _Task, start: Fitted, fit: Callable[[Artwork, _Patches, float], _Descent]
 ) -> Fitted:
-    """One homography, its patches, and Gauss-Newton on the shift of every point."""
-    n = len(start.px)
+    """One warp, its patches, and Gauss-Newton on the shift of every point."""
+    n, board_mm, artwork = len(start.px), task.board_mm, task.artwork
     if start.ok.sum() < 4:
         return start
-    H = robust_homography(board_mm[start.ok], start.px[start.ok])
-    base = apply_homography(H, board_mm)
-    inside = _inside(H, board_mm, reach_mm, start.px - base, grey.shape)
+    warp = bent_warp(board_mm[start.ok], start.px[start.ok])
+    base = warp.forward(board_mm)
     lost = Fitted(start.px, np.full(n, np.nan), np.zeros(n, dtype=np.bool_))
-    if not inside.any():
-        return lost
-    at = np.flatnonzero(inside)
-    shift = (start.px - base)[at]
-    patches, full = _patches(grey, H, board_mm[at], reach_mm[at], base[at] + shift, shift)
-    at, shift = at[full], shift[full]
+    at = np.flatnonzero(_inside(warp, task, start.px - base))
     if at.size == 0:
         return lost
-    scale = artwork.px_per_mm * np.sqrt(abs(np.linalg.det(patches.by_px.mean(axis=0))))
+    patches, full = _patches(task, warp, at, (start.px - base)[at])
+    at = at[full]
+    if at.size == 0:
+        return lost
+    scale = artwork.px_per_mm * np.sqrt(abs(np.linalg.det(patches.by_px.mean(axis=0).reshape(2, 2))))
     found = fit(artwork, patches, float(scale))
     px, sigma, ok = start.px.copy(), np.full(n, np.nan), np.zeros(n, dtype=np.bool_)
     ok[at] = found.good
-    px[at[found.good]] = (base[at] + shift + found.move)[found.good]
+    px[at[found.good]] = (start.px[at] + found.move)[found.good]
     sigma[at] = np.hypot(found.sigma_px, FLOOR_PX)
     return Fitted(px, sigma, ok)
 
@@ -120,42 +116,55 @@ def _round(
 _AROUND = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
-def _inside(
-    H: Floats, board_mm: Floats, reach_mm: Floats, shift: Floats, shape: tuple[int, ...]
-) -> Bools:
-    """Whether the patch of each point lies wholly in the image (N,)."""
+def _outlines(warp: Warp, board_mm: Floats, reach_mm: Floats, shift: Floats) -> Floats:
+    """The corners of each patch in the image (N, 4, 2)."""
     around = board_mm[:, None] + reach_mm[:, None, None] * _AROUND
-    px = apply_homography(H, around.reshape(-1, 2)).reshape(-1, 4, 2) + shift[:, None]
-    limit = np.array([shape[1] - 2, shape[0] - 2])
+    out: Floats = warp.forward(around.reshape(-1, 2)).reshape(-1, 4, 2) + shift[:, None]
+    return out
+
+
+def _inside(warp: Warp, task: _Task, shift: Floats) -> Bools:
+    """Whether the patch of each point lies wholly in the image (N,)."""
+    px = _outlines(warp, task.board_mm, task.reach_mm, shift)
+    limit = np.array([task.grey.shape[1] - 2, task.grey.shape[0] - 2])
     return np.asarray(((px >= 1) & (px <= limit)).all(axis=(1, 2)), dtype=np.bool_)
 
 
-def _patches(
-    grey: Grey, H: Floats, board_mm: Floats, reach_mm: Floats, px: Floats, shift: Floats
-) -> tuple[_Patches, Bools]:
+def _patches(task: _Task, warp: Warp, at: Ints, shift: Floats) -> tuple[_Patches, Bools]:
     """The pixels whose place on the board lies within the reach of a point, and which points."""
-    corners = board_mm[:, None] + reach_mm[:, None, None] * _AROUND
-    outline = apply_homography(H, corners.reshape(-1, 2)).reshape(-1, 4, 2) + shift[:, None]
+    board_mm = task.board_mm[at]
+    area = (4 * task.reach_mm[at] ** 2 * np.abs(np.linalg.det(warp.jacobian(board_mm)))).sum()
+    budget = max(task.pixels, LEAST_PER_POINT * at.size)
+    reach_mm = task.reach_mm[at] * min(1.0, np.sqrt(budget / max(area, 1.0)))
+    outline = _outlines(warp, board_mm, reach_mm, shift)
     low, high = np.ceil(outline.min(axis=1)), np.floor(outline.max(axis=1))
-    sides = np.maximum(high - low + 1, 0)
-    stride = max(1, int(np.ceil(np.sqrt(0.7 * sides.prod(axis=1).sum() / MOST_PIXELS))))
-    grids = [
-        np.stack(np.meshgrid(np.arange(a[0], b[0] + 1, stride), np.arange(a[1], b[1] + 1, stride)), -1)
-        for a, b in zip(low, high, strict=True)
-    ]
-    point = np.repeat(np.arange(len(px)), [g.shape[0] * g.shape[1] for g in grids])
-    pixel = np.concatenate([g.reshape(-1, 2) for g in grids])
-    inverse = np.linalg.inv(H)
-    place = apply_homography(inverse, pixel - shift[point])
-    near = np.abs(place - board_mm[point]).max(axis=1) < reach_mm[point]
-    enough = np.bincount(point, near, len(px)) >= 25
-    near &= enough[point]
-    point, pixel, place = point[near], pixel[near], place[near]
-    point = (np.cumsum(enough) - 1)[point]
-    by_px = homography_jacobian(inverse, pixel - shift[enough][point]) if point.size else np.zeros((0, 2, 2))
-    values = grey[pixel[:, 1].astype(np.int64), pixel[:, 0].astype(np.int64)].astype(np.float64)
-    start = np.searchsorted(point, np.arange(int(enough.sum())))
-    return _Patches(start, point, values, place, by_px), enough
+    middle = warp.forward(board_mm) + shift
+    back = warp.local_inverse(board_mm, reach_mm)
+    parts, full = [], np.zeros(at.size, dtype=np.bool_)
+    for k in range(at.size):
+        grid = np.meshgrid(*(np.arange(u, v + 1) for u, v in zip(low[k], high[k], strict=True)))
+        x, y = grid[0].ravel(), grid[1].ravel()
+        place, by_px = back[k].at(x - middle[k, 0], y - middle[k, 1])
+        local = (place - board_mm[k]) / reach_mm[k]
+        near = np.abs(local).max(axis=1, initial=0.0) < 1
+        full[k] = near.sum() >= LEAST_PIXELS
+        values = task.grey[y[near].astype(np.int64), x[near].astype(np.int64)].astype(np.float64)
+        if full[k]:
+            parts.append((values, place[near], local[near], by_px[near]))
+    return _joined(parts), full
+
+
+def _joined(parts: list[tuple[Floats, Floats, Floats, Floats]]) -> _Patches:
+    counts = [len(part[0]) for part in parts]
+    if not parts:
+        none = np.zeros(0, dtype=np.int64)
+        return _Patches(none, none, np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 4)))
+    start = np.cumsum([0, *counts[:-1]])
+    return _Patches(
+        start,
+        np.repeat(np.arange(len(parts)), counts),
+        *(np.concatenate([part[k] for part in parts]) for k in range(4)),
+    )
 
 
 def _sample(layer: Image, px: Image) -> Floats:
@@ -208,77 +217,102 @@ class _Descent:
 
 def _drawn(artwork: Artwork, patches: _Patches, layer: Image, move: Floats) -> Floats:
     """Print and its derivative by the move of the point (M, 3)."""
-    place = patches.board_mm - np.einsum("mij,mj->mi", patches.by_px, move[patches.point])
+    (xx, xy, yx, yy), (mx, my) = patches.by_px.T, move[patches.point].T
+    place = patches.board_mm - np.stack([xx * mx + xy * my, yx * mx + yy * my], axis=1)
     drawn = _sample(layer, artwork.pixels(place))
-    slope = -np.einsum("mj,mji->mi", drawn[:, 1:], patches.by_px) * artwork.px_per_mm
-    return np.column_stack([drawn[:, 0], slope])
+    tx, ty = -artwork.px_per_mm * drawn[:, 1], -artwork.px_per_mm * drawn[:, 2]
+    drawn[:, 1], drawn[:, 2] = tx * xx + ty * yx, tx * xy + ty * yy
+    return drawn
 
 
-def _light(patches: _Patches, drawn: Floats) -> tuple[Floats, Floats]:
-    """Gain and offset (N,) of each patch by linear least squares."""
-    T, grey = drawn[:, 0], patches.grey
-    count, t, tt, g, tg = patches.sums(
-        np.column_stack([np.ones_like(T), T, T * T, grey, T * grey])
-    ).T
-    gain = (count * tg - t * g) / np.maximum(count * tt - t * t, 1e-9)
-    return gain, (g - gain * t) / count
+def _light_columns(patches: _Patches, drawn: Floats) -> Floats:
+    """What light makes of a print (M, 6): gain and offset, each a plane over the patch."""
+    T, (x, y) = drawn[:, 0], patches.local.T
+    return np.stack([T, np.ones_like(T), x, y, T * x, T * y], axis=1)
+
+
+def _per_patch(patches: _Patches, columns: Floats, weight: Floats | None = None) -> Floats:
+    """Gram matrices (N, C, C) of ``columns`` (M, C) over the pixels of each patch."""
+    other = columns if weight is None else columns * weight[:, None]
+    ends = np.append(patches.start, patches.point.size)
+    return np.array([
+        columns[a:b].T @ other[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True)
+    ])  # fmt: skip
+
+
+def _firm(matrix: Floats) -> Floats:
+    """The matrices (N, C, C), invertible for sure."""
+    size = matrix.shape[-1]
+    trace = np.einsum("nii->n", matrix)
+    out: Floats = matrix + (1e-8 * trace + 1e-9)[:, None, None] * np.eye(size)
+    return out
+
+
+def _light(patches: _Patches, drawn: Floats) -> Floats:
+    """The light (N, 6) of each patch by linear least squares."""
+    columns = np.column_stack([_light_columns(patches, drawn), patches.grey])
+    gram = _per_patch(patches, columns)
+    out: Floats = np.linalg.solve(_firm(gram[:, :6, :6]), gram[:, :6, 6:])[:, :, 0]
+    return out
+
+
+def _left_over(patches: _Patches, drawn: Floats, light: Floats) -> Floats:
+    """Grey values (M,) that print and light do not explain."""
+    shown = np.einsum("mi,mi->m", _light_columns(patches, drawn), light[patches.point])
+    out: Floats = patches.grey - shown
+    return out
+
+
+def _rms(patches: _Patches, residual: Floats) -> Floats:
+    """Rms (N,) of each patch."""
+    out: Floats = np.sqrt(patches.sums((residual**2)[:, None])[:, 0] / patches.count)
+    return out
 
 
 def _rest(artwork: Artwork, patches: _Patches, layer: Image, move: Floats) -> float:
     """Median over the patches of the residual, rms."""
     drawn = _drawn(artwork, patches, layer, move)
-    gain, offset = _light(patches, drawn)
-    residual = patches.grey - offset[patches.point] - gain[patches.point] * drawn[:, 0]
-    count = np.diff(np.append(patches.start, patches.point.size))
-    return float(np.median(np.sqrt(patches.sums((residual**2)[:, None])[:, 0] / count)))
+    return float(np.median(_rms(patches, _left_over(patches, drawn, _light(patches, drawn)))))
 
 
-def _descend(artwork: Artwork, patches: _Patches, layer: Image, move: Floats, steps: int) -> _Descent:
-    k = patches.point
-    count = np.diff(np.append(patches.start, k.size)).astype(np.float64)
+def _descend(
+    artwork: Artwork, patches: _Patches, layer: Image, move: Floats, steps: int
+) -> _Descent:
+    """Gauss-Newton with Tukey weights; at most ``steps`` steps, or until nothing moves."""
     drawn = _drawn(artwork, patches, layer, move)
-    gain, offset = _light(patches, drawn)
+    light = _light(patches, drawn)
     for _ in range(steps):
-        residual = patches.grey - offset[k] - gain[k] * drawn[:, 0]
-        rms = np.sqrt(patches.sums((residual**2)[:, None])[:, 0] / count)
-        limit = np.maximum(0.36 * np.abs(gain), 3.9 * rms)[k]
-        weight = np.clip(1 - (residual / limit) ** 2, 0, None) ** 2
-        normal, right, square = _normal(patches, drawn, gain, weight, residual)
-        step = np.linalg.solve(normal, right[:, :, None])[:, :, 0]
+        residual = _left_over(patches, drawn, light)
+        limit = np.maximum(0.36 * np.abs(light[:, 0]), 3.9 * _rms(patches, residual))
+        weight = np.clip(1 - (residual / limit[patches.point]) ** 2, 0, None) ** 2
+        gram = _per_patch(patches, _unknowns(patches, drawn, light, residual), weight)
+        normal = _firm(gram[:, :8, :8])
+        step = np.linalg.solve(normal, gram[:, :8, 8:])[:, :, 0]
         length = np.linalg.norm(step[:, :2], axis=1)
         move = move + step[:, :2] * np.minimum(1, 1.5 / np.maximum(length, 1e-9))[:, None]
-        gain, offset = gain + step[:, 2], offset + step[:, 3]
+        light = light + step[:, 2:]
         drawn = _drawn(artwork, patches, layer, move)
         if length.max() < 4e-3:
             break
     total = patches.sums(weight[:, None])[:, 0]
-    variance = square / np.maximum(total - 4, 1)
+    variance = gram[:, 8, 8] / np.maximum(total - 8, 1)
     covariance = np.linalg.inv(normal)[:, :2, :2] * variance[:, None, None]
     sigma = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 2)
-    return _Descent(move, sigma, gain, _ncc(patches, drawn[:, 0]), length)
+    return _Descent(move, sigma, light[:, 0], _ncc(patches, drawn[:, 0]), length)
 
 
-def _normal(
-    patches: _Patches, drawn: Floats, gain: Floats, weight: Floats, residual: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Normal matrices (N, 4, 4), right sides (N, 4), weighted squares (N,); move, gain, offset."""
-    g = gain[patches.point]
-    columns = np.column_stack([g * drawn[:, 1], g * drawn[:, 2], drawn[:, 0], np.ones_like(g), residual])
-    weighted = columns * weight[:, None]
-    ends = np.append(patches.start, g.size)
-    full = np.array([
-        columns[a:b].T @ weighted[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True)
-    ])  # fmt: skip
-    normal = full[:, :4, :4]
-    normal = normal + 1e-7 * np.einsum("nii->n", normal)[:, None, None] * np.eye(4) + 1e-9 * np.eye(4)
-    return normal, full[:, :4, 4], full[:, 4, 4]
+def _unknowns(patches: _Patches, drawn: Floats, light: Floats, residual: Floats) -> Floats:
+    """Derivatives by move and light (M, 8), then the residual (M, 1)."""
+    x, y = patches.local.T
+    at = light[patches.point]
+    gain = at[:, 0] + at[:, 4] * x + at[:, 5] * y
+    return np.column_stack([gain[:, None] * drawn[:, 1:], _light_columns(patches, drawn), residual])
 
 
 def _ncc(patches: _Patches, drawn: Floats) -> Floats:
-    """Correlation (N,) between print and image, signed like the gain's magnitude (never below 0)."""
-    count = np.diff(np.append(patches.start, patches.point.size))
+    """Size of the correlation (N,) between print and image; an inverted print is one too."""
     grey = patches.grey
     columns = np.column_stack([drawn, grey, drawn * drawn, grey * grey, drawn * grey])
-    t, g, tt, gg, tg = (patches.sums(columns) / count[:, None]).T
+    t, g, tt, gg, tg = (patches.sums(columns) / patches.count[:, None]).T
     spread = np.sqrt(np.maximum((tt - t * t) * (gg - g * g), 1e-18))
     return np.asarray(np.abs(tg - t * g) / spread, dtype=np.float64)

@@ -10,10 +10,10 @@ import numpy as np
 from olivevib.arrays import Floats, Grey, Ints
 from olivevib.calibration.artwork import Artwork, charuco_board, draw_artwork
 from olivevib.calibration.boards import CORNERS_PER_MARKER, Board, markers_on, predefined
-from olivevib.calibration.corners import refine, robust_homography
+from olivevib.calibration.corners import refine
 from olivevib.calibration.views import BoardView
+from olivevib.calibration.warp import bent_warp
 from olivevib.detection.detection import Reader
-from olivevib.geometry import apply_homography
 
 LEAST_POINTS = 4
 PREDICT_FROM = 6  # points that predict where the missing ones are
@@ -74,8 +74,7 @@ def refined(board: Board, artwork: Artwork, grey: Grey, raw: Raw) -> tuple[Ints,
     ids, px = raw
     plane = board.points_mm[:, :2]
     if ids.size >= PREDICT_FROM:
-        H = robust_homography(plane[ids], px)
-        px_all = apply_homography(H, plane)
+        px_all = bent_warp(plane[ids], px).forward(plane)
         px_all[ids] = px
         found, ids_all = np.isin(np.arange(len(plane)), ids), np.arange(len(plane))
     else:

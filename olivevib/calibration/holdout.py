@@ -16,7 +16,8 @@ from olivevib.calibration.assemble import Side
 from olivevib.calibration.bundle import State
 from olivevib.calibration.rigid import epipolar_px, triangulate
 from olivevib.calibration.tracks import motion_at
-from olivevib.calibration.views import BoardView, common_ids, pair_views
+from olivevib.calibration.uncertainty import rig_sensitivity
+from olivevib.calibration.views import BoardView, common_ids, pair_views, times
 from olivevib.geometry import StereoRig
 
 LARGEST_TRACK_PX = 0.5  # where a track in time is less sure than this, a pair is no test
@@ -30,7 +31,7 @@ class HoldOut:
     could be compared (the rest: the board jerked, or left the image); rms, median (of absolute
     errors) and bias of the distances in mm and %; epipolar_rms_px; z_rms_mm: rms of the points'
     depth about the rigid board; reprojection_rms_px per axis after the board was placed rigidly;
-    z_ratio: rms of epipolar errors against what their sigmas predict.
+    rms_z: rms of the distances' errors against their predicted sd (1: honest; NaN: not known).
     errors_percent (P,), errors_mm (P,) and frame (P,) of every distance.
     """
 
@@ -46,7 +47,7 @@ class HoldOut:
     epipolar_rms_px: float
     z_rms_mm: float
     reprojection_rms_px: float
-    z_ratio: float
+    rms_z: float
     errors_percent: Floats = field(repr=False)
     errors_mm: Floats = field(repr=False)
     frame: Ints = field(repr=False)
@@ -81,20 +82,23 @@ class FrameTest:
     right_px: Floats
     xyz_mm: Floats
     epipolar_px: Floats
-    epipolar_sigma_px: Floats
+    sigma_px: Floats  # (N, 2) left, right
     wanted: int
 
 
 def test_frame(rig: StereoRig, state: State, sides: tuple[Side, Side], pair: tuple[int, int]) -> FrameTest:
     """Triangulate the common points of one frame, both images taken to the same instant."""
     left, right = (side.views[k] for side, k in zip(sides, pair, strict=True))
+    if sides[1].timed:
+        gap = np.abs(times(sides[1].views) - left.t_s - state.lag_s)
+        right = sides[1].views[int(gap.argmin())]
     ids = common_ids(left, right)
     place = left.board_mm[np.searchsorted(left.ids, ids)]
     a, sigma_a, ok_a = _at_instant(sides[0], left, ids, 0.0)
     b, sigma_b, ok_b = _at_instant(sides[1], right, ids, left.t_s + state.lag_s - right.t_s)
     ok = ok_a & ok_b
     xyz, _, _ = triangulate(rig, a[ok], b[ok])
-    miss, sigma = epipolar_px(rig, a[ok], b[ok]), np.hypot(sigma_a[ok], sigma_b[ok])
+    miss, sigma = epipolar_px(rig, a[ok], b[ok]), np.column_stack([sigma_a[ok], sigma_b[ok]])
     return FrameTest(left.frame, place[ok], a[ok], b[ok], xyz, miss, sigma, ids.size)
 
 
@@ -121,7 +125,7 @@ def measure(rig: StereoRig, state: State, sides: tuple[Side, Side], test: Sequen
     errors = [distance_errors(f.board_mm, f.xyz_mm) for f in frames]
     share, mm = (np.concatenate(e) for e in zip(*errors, strict=True))
     epipolar = np.concatenate([f.epipolar_px for f in frames])
-    sigma = np.concatenate([f.epipolar_sigma_px for f in frames])
+    predicted = np.concatenate([predicted_sd(rig, f) for f in frames])
     depth, again = zip(*(_rigid_errors(rig, f) for f in frames if len(f.board_mm) >= 3), strict=True)
     return HoldOut(
         frames=len(frames),
@@ -136,7 +140,7 @@ def measure(rig: StereoRig, state: State, sides: tuple[Side, Side], test: Sequen
         epipolar_rms_px=_rms(epipolar),
         z_rms_mm=_rms(np.concatenate(depth)),
         reprojection_rms_px=_rms(np.concatenate(again)),
-        z_ratio=_rms(epipolar / sigma),
+        rms_z=_rms(mm / predicted),
         errors_percent=100 * share,
         errors_mm=mm,
         frame=np.concatenate([np.full(len(e[0]), f.frame) for e, f in zip(errors, frames, strict=True)]),
@@ -149,6 +153,21 @@ def distance_errors(board_mm: Floats, xyz_mm: Floats) -> tuple[Floats, Floats]:
     true = np.linalg.norm(board_mm[i] - board_mm[j], axis=1)
     measured = np.linalg.norm(xyz_mm[i] - xyz_mm[j], axis=1)
     return measured / true - 1, measured - true
+
+
+def predicted_sd(rig: StereoRig, frame: FrameTest) -> Floats:
+    """Predicted sd (P,) mm of all distances of a frame: pixels and rig; NaN without covariance."""
+    if rig.covariance is None:
+        return np.full(len(frame.xyz_mm) * (len(frame.xyz_mm) - 1) // 2, np.nan)
+    by_rig, by_px = rig_sensitivity(rig, frame.xyz_mm)
+    noise = np.square(frame.sigma_px)[:, [0, 0, 1, 1]]
+    own = np.einsum("nij,nj,nkj->nik", by_px, noise, by_px)
+    i, j = np.triu_indices(len(frame.xyz_mm), 1)
+    between = frame.xyz_mm[i] - frame.xyz_mm[j]
+    unit = between / np.linalg.norm(between, axis=1, keepdims=True)
+    slope = np.einsum("ni,nij->nj", unit, by_rig[i] - by_rig[j])
+    common = np.einsum("ni,ij,nj->n", slope, rig.covariance, slope)
+    return np.asarray(np.sqrt(common + np.einsum("ni,nij,nj->n", unit, own[i] + own[j], unit)))
 
 
 def _rigid_errors(rig: StereoRig, frame: FrameTest) -> tuple[Floats, Floats]:

@@ -14,11 +14,14 @@ from olivevib.calibration.lag import LeftPoints, Pose, medoid_pose, search_lag
 from olivevib.calibration.lens import LensFit, fit_lens, lens_prior, mono_prior
 from olivevib.calibration.settings import CalibrationSettings
 from olivevib.calibration.solve import Prior, Problem, Solution, grams, solve
-from olivevib.calibration.views import BoardView, pair_views, stamped, times
+from olivevib.calibration.tracks import LONGEST_GAP_S
+from olivevib.calibration.views import BoardView, frame_period_s, pair_views, stamped, times
 from olivevib.geometry import CameraModel
 from olivevib.progress import Tick, silent
 
 FIRST_JITTER_S = 0.003  # scatter of a webcam's stamps to begin with
+LEAST_JITTER_S = 2e-5
+WIDEST_LAG_S = 1.0  # the search goes no further
 
 
 @dataclass(frozen=True)
@@ -73,10 +76,10 @@ def make_pair(
     """Gather the views of both cameras."""
     both = [*left, *right]
     row = float(np.mean(np.concatenate([view.px[:, 1] for view in both])))
-    timed = stamped(left) and stamped(right)
+    timed = all(stamped(v) and frame_period_s(times(v)) <= LONGEST_GAP_S for v in (left, right))
     times_s = (settings.left_shutter.row_time_s, settings.right_shutter.row_time_s)
     a, b = (
-        Side(tuple(views), camera, timed, row, row_time)
+        Side(tuple(views), tuple(views), camera, timed, row, row_time)
         for views, camera, row_time in zip((left, right), cameras, times_s, strict=True)
     )
     return Pair(a, b, shape_of(both))
@@ -116,6 +119,7 @@ def joint_prior(pair: Pair, settings: CalibrationSettings) -> Prior:
         if sds[k] > 0:
             precision[ROW_OF[k], ROW_OF[k]] = 1 / sds[k] ** 2
     precision[BOW, BOW] = np.eye(3) / settings.lens.bow_sd_mm**2
+    precision[LAG, LAG] = 1 / settings.lag_range_s**2
     return Prior(mean, precision, settings.lens.aspect_sd)
 
 
@@ -168,15 +172,18 @@ def with_row_times(pair: Pair, state: State) -> Pair:
 
 
 def jitter_sd(problem: Problem, state: State) -> float:
-    """The scatter of single views about the common lag, s: one step of expectation-maximisation."""
+    """The scatter of single views about the common lag, s: one step towards its most likely value.
+
+    Source: MacKay, Bayesian interpolation, 1992 (well-determined parameters counted).
+    """
     gram, _ = grams(problem, state)
     U = gram[:, :POSE, :POSE]
     U = U + 1e-12 * np.eye(POSE) * np.einsum("vii->v", U[:, :6, :6])[:, None, None]
-    variance = np.linalg.inv(U)[:, 6, 6]
-    moving = variance < 0.999 / problem.jitter_precision
-    if not moving.any():
+    known = 1 - np.linalg.inv(U)[:, 6, 6] * problem.jitter_precision
+    known = np.where(known > 1e-3, known, 0.0)  # a still board tells nothing
+    if known.sum() < 3:
         return problem.jitter_sd_s
-    return float(np.sqrt((state.jitter_s**2 + variance)[moving].mean()))
+    return max(float(np.sqrt((state.jitter_s**2).sum() / known.sum())), LEAST_JITTER_S)
 
 
 def start_pose(
@@ -189,12 +196,16 @@ def start_pose(
     pose = medoid_pose(left.R_pose[a], left.t_pose_mm[a], right.R_pose[b], right.t_pose_mm[b])
     if not (pair.timed and settings.estimate_lag):
         return pose, 0.0, np.zeros((0, 2))
-    samples = pair.right.samples()
-    step = min(samples.period_s / 5, settings.lag_range_s / 4)
-    count = int(np.ceil(settings.lag_range_s / step))
-    lags = step * np.arange(-count, count + 1)
-    lag, pose, rms = search_lag(left_points(pair, left), samples, lenses[1].camera, pose, lags)
-    return pose, lag, np.column_stack([lags, rms])
+    samples, points = pair.right.samples(), left_points(pair, left)
+    reach, camera = settings.lag_range_s, lenses[1].camera
+    while True:
+        step = min(samples.period_s / 5, reach / 4)
+        count = int(np.ceil(reach / step))
+        lags = step * np.arange(-count, count + 1)
+        lag, found, rms = search_lag(points, samples, camera, pose, lags)
+        if abs(lag) < reach - 1.5 * step or reach >= WIDEST_LAG_S:
+            return found, lag, np.column_stack([lags, rms])
+        reach *= 2  # the best lag lies at the edge: look further
 
 
 def left_points(pair: Pair, left: State) -> LeftPoints:

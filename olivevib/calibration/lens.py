@@ -121,7 +121,22 @@ def planar_pose(board_mm: Floats, rays: Floats) -> tuple[Floats, Floats]:
     scale = 2 / (np.linalg.norm(H[:, 0]) + np.linalg.norm(H[:, 1]))
     H = H * (scale if H[2] @ np.append(board_mm[:, :2].mean(axis=0), 1.0) > 0 else -scale)
     R = nearest_rotation(np.column_stack([H[:, 0], H[:, 1], np.cross(H[:, 0], H[:, 1])]))
+    depth = board_mm @ R[2] + H[2, 2]
+    if depth.min() < 0.2 * depth.max():  # few points, almost in line: no pose to trust
+        return frontal_pose(board_mm, rays)
     return R, H[:, 2]
+
+
+def frontal_pose(board_mm: Floats, rays: Floats) -> tuple[Floats, Floats]:
+    """The pose of a board that faces the camera: the best similarity of board and rays (N, 3)."""
+    a, b = board_mm[:, :2] @ [1, 1j], rays[:, :2] @ [1, 1j]
+    turn = np.vdot(a - a.mean(), b - b.mean()) / np.vdot(a - a.mean(), a - a.mean()).real
+    depth, angle = 1 / max(abs(turn), 1e-12), np.angle(turn)
+    R = np.array([
+        [np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]
+    ])  # fmt: skip
+    middle = depth * np.array([b.mean().real, b.mean().imag, 1.0])
+    return R, middle - R @ board_mm.mean(axis=0)
 
 
 def better_poses(problem: Problem, state: State) -> State | None:

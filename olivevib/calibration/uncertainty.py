@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from olivevib.arrays import Floats
-from olivevib.calibration.bundle import LAG, STEREO, THETA
+from olivevib.calibration.bundle import LAG, LENS_OF, STEREO, THETA
 from olivevib.calibration.solve import Problem, Solution, grams, reduce
-from olivevib.geometry import skew, vector_from_rotation
+from olivevib.geometry import StereoRig, skew, vector_from_rotation
 
 
 @dataclass(frozen=True)
@@ -97,3 +97,62 @@ def vector_jacobian(R: Floats) -> Floats:
         return np.asarray(np.eye(3) - S / 2, dtype=np.float64)
     factor = 1 / angle**2 - (1 + np.cos(angle)) / (2 * angle * np.sin(angle))
     return np.asarray(np.eye(3) - S / 2 + factor * S @ S, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class PointSigma:
+    """How well points are known: covariances (N, 3, 3) mm^2, the rig's part and one frame's part.
+
+    common: the same error in every frame (the rig is a little wrong); frame: fresh in every frame
+    (the pixels are).
+    """
+
+    common: Floats
+    frame: Floats
+
+    @property
+    def common_mm(self) -> Floats:
+        """Sigma of x, y, z (N, 3) from the rig."""
+        return np.asarray(np.sqrt(np.einsum("nii->ni", self.common)), dtype=np.float64)
+
+    @property
+    def frame_mm(self) -> Floats:
+        """Sigma of x, y, z (N, 3) from the pixels of one frame."""
+        return np.asarray(np.sqrt(np.einsum("nii->ni", self.frame)), dtype=np.float64)
+
+
+def rig_sensitivity(rig: StereoRig, xyz_mm: Floats) -> tuple[Floats, Floats]:
+    """d point / d RIG (N, 3, 18) and d point / d pixels (N, 3, 4) of points in the left frame."""
+    J = np.zeros((len(xyz_mm), 4, LAG))
+    _, by_left, J[:, :2, LENS_OF[0]] = rig.left.project_jacobian(xyz_mm)
+    turned = xyz_mm @ rig.R_right_left.T
+    _, by_right, lens = rig.right.project_jacobian(turned + rig.t_right_left_mm)
+    J[:, 2:, LENS_OF[1]] = lens
+    small = -by_right @ skew(turned)
+    J[:, 2:, 12:15] = small @ np.linalg.inv(vector_jacobian(rig.R_right_left))
+    J[:, 2:, 15:18] = by_right
+    A = np.concatenate([by_left, by_right @ rig.R_right_left], axis=1)
+    backward = np.linalg.solve(A.transpose(0, 2, 1) @ A, A.transpose(0, 2, 1))
+    return -backward @ J, backward
+
+
+def point_sigma(rig: StereoRig, xyz_mm: Floats, sigma_px: tuple[float, float]) -> PointSigma:
+    """What to expect of points (N, 3) mm in the left frame, measured with these pixel sigmas.
+
+    Needs ``rig.covariance``; NaN in front of neither camera.
+    """
+    by_rig, by_px = rig_sensitivity(rig, xyz_mm)
+    noise = np.diag(np.repeat(np.square(sigma_px), 2))
+    cov = np.full((LAG, LAG), np.nan) if rig.covariance is None else rig.covariance
+    frame = by_px @ noise @ by_px.transpose(0, 2, 1)
+    return PointSigma(by_rig @ cov @ by_rig.transpose(0, 2, 1), frame)
+
+
+def length_sigma(rig: StereoRig, a_mm: Floats, b_mm: Floats) -> Floats:
+    """Sigma (N,) mm of the distances between points (N, 3) that an error of the rig causes."""
+    between = a_mm - b_mm
+    unit = between / np.linalg.norm(between, axis=1, keepdims=True)
+    by_rig = rig_sensitivity(rig, a_mm)[0] - rig_sensitivity(rig, b_mm)[0]
+    slope = np.einsum("ni,nij->nj", unit, by_rig)
+    cov = np.full((LAG, LAG), np.nan) if rig.covariance is None else rig.covariance
+    return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", slope, cov, slope)), dtype=np.float64)

@@ -1,0 +1,111 @@
+"""The door of the room: board views of two cameras in, a calibrated and tested pair out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from olivevib.calibration.gather import gather, published_rig
+from olivevib.calibration.holdout import HoldOut, common_pairs, measure, with_tracks, without
+from olivevib.calibration.joint import Pair, fit_joint, fit_single, make_pair
+from olivevib.calibration.outliers import Cleaned, drop_outliers
+from olivevib.calibration.quality import halves_test
+from olivevib.calibration.result import Calibration
+from olivevib.calibration.settings import CalibrationSettings
+from olivevib.calibration.thin import thin
+from olivevib.calibration.uncertainty import uncertainty
+from olivevib.calibration.views import BoardView
+from olivevib.errors import InputError
+from olivevib.geometry import CameraModel
+from olivevib.progress import Tick, silent
+
+Size = tuple[int, int]
+LEAST_TEST_FRAMES = 6  # common frames below which none is kept for the test
+
+
+def calibrate(
+    left: Sequence[BoardView],
+    right: Sequence[BoardView],
+    size_left: Size,
+    size_right: Size,
+    settings: CalibrationSettings | None = None,
+    tick: Tick = silent,
+) -> Calibration:
+    """Calibrate both lenses, their pose and the lag between the videos, tested on unused frames.
+
+    ``left``, ``right``: board views of each camera (videos: with stamps; stills: NaN stamps, paired
+    by frame number); sizes (width, height) px. Raises InputError where too few views are common.
+    Degenerates (cautions say so) where the board is never tilted or always equally far.
+    """
+    settings = settings or CalibrationSettings()
+    pair = make_pair_checked(left, right, (size_left, size_right), settings)
+    tick(0, 4, "testing on unused frames")
+    tested = cross_validate(pair, settings, tick)
+    tick(1, 4, "solving with all frames")
+    cleaned = fit_all(thin(pair, settings.most_views), settings, tick)
+    tick(2, 4, "asking both halves")
+    halves = halves_test(cleaned.fit)
+    tick(3, 4, "judging")
+    return gather(pair, cleaned, tested, halves)
+
+
+def fit_all(pair: Pair, settings: CalibrationSettings, tick: Tick = silent) -> Cleaned:
+    """Single lenses, joint solve, outliers dropped."""
+    fit = fit_joint(pair, settings, fit_single(pair, settings), tick)
+    return drop_outliers(fit, settings)
+
+
+def make_pair_checked(
+    left: Sequence[BoardView],
+    right: Sequence[BoardView],
+    sizes: tuple[Size, Size],
+    settings: CalibrationSettings,
+) -> Pair:
+    """The pair of views, or InputError saying what is missing."""
+    for side, views in (("left", left), ("right", right)):
+        if len(views) < settings.least_pairs:
+            raise InputError(
+                f"The {side} camera shows the board in {len(views)} views; at least "
+                f"{settings.least_pairs} are needed.",
+                "Either the board was rarely in the picture, or it was not recognised.",
+                "Show the whole board to both cameras at once in 10 or more places; if it was "
+                "there, look at the board's description and at what the diagnosis says.",
+            )
+    common = len(common_pairs(left, right, 4))
+    if common < settings.least_pairs:
+        raise InputError(
+            f"Both cameras see the board together in {common} views; at least "
+            f"{settings.least_pairs} are needed.",
+            f"The left camera shows it in {len(left)} views, the right one in {len(right)}, but "
+            "hardly at the same time.",
+            "Show it to both cameras at once; check that both recordings started together and "
+            "that the stamps are those of these recordings.",
+        )
+    shutters = (settings.left_shutter, settings.right_shutter)
+    cameras = [
+        _blank(size, s.row_time_s, s.source) for size, s in zip(sizes, shutters, strict=True)
+    ]
+    return make_pair(left, right, (cameras[0], cameras[1]), settings)
+
+
+def _blank(size: Size, row_time_s: float, source: str) -> CameraModel:
+    width, height = size
+    K = np.array([[width, 0, (width - 1) / 2], [0, width, (height - 1) / 2], [0, 0, 1.0]])
+    return CameraModel(size, K, np.zeros(5), row_time_s, row_time_source=source)
+
+
+def cross_validate(pair: Pair, settings: CalibrationSettings, tick: Tick = silent) -> HoldOut | None:
+    """Fit without the odd common frames, test on them; None where there are too few."""
+    common = common_pairs(pair.left.views, pair.right.views, settings.common_points)
+    if len(common) < LEAST_TEST_FRAMES:
+        return None
+    test = common[1::2]
+    left = without(pair.left.views, [k for k, _ in test])
+    right = without(pair.right.views, [m for _, m in test])
+    cameras = (pair.left.camera, pair.right.camera)
+    train = thin(make_pair(left, right, cameras, settings), settings.most_views)
+    cleaned = fit_all(train, settings, tick)
+    rig = published_rig(cleaned.fit, uncertainty(cleaned.fit.problem, cleaned.fit.solution))
+    scales = (cleaned.fit.lenses[0].scale, cleaned.fit.lenses[1].scale)
+    return measure(rig, cleaned.fit.state, with_tracks(pair.sides, cleaned.fit.state, scales), test)
