@@ -123,3 +123,60 @@ def pose(
     K = np.array([[F_PX, 0, 639.5], [0, F_PX, 359.5], [0, 0, 1]])
     H = K @ np.column_stack([R[:, 0] * module_mm, R[:, 1] * module_mm, distance])
     return H / H[2, 2]
+
+
+def _around(H: np.ndarray, canvas: Canvas, half_px: int = 86):
+    """Slices of a window about a marker's centre, with the pixels' x and y."""
+    cx, cy = np.rint(apply_homography(H, [[0, 0]])[0]).astype(int)
+    x0, x1 = max(cx - half_px, 0), min(cx + half_px, canvas.width)
+    y0, y1 = max(cy - half_px, 0), min(cy + half_px, canvas.height)
+    y, x = np.mgrid[y0:y1, x0:x1]
+    return np.s_[y0:y1, x0:x1], x - cx, y - cy
+
+
+def shadow_edge(canvas: Canvas, H: np.ndarray, factor: float, off_px: float) -> None:
+    """A hard shadow over one side of a line through the marker."""
+    window, x, y = _around(H, canvas)
+    a = canvas.rng.uniform(0, 2 * np.pi)
+    inside = np.clip(x * np.cos(a) + y * np.sin(a) - off_px + 0.5, 0, 1)
+    canvas.light[window] *= 1 - (1 - factor) * inside
+
+
+def dapple(canvas: Canvas, leaves: int = 900, blur_px: float = 3.0) -> None:
+    """Soft shadows of leaves, x .3 to .6, all over the scene."""
+    light = np.ones(canvas.light.shape, np.float32)
+    for _ in range(leaves):
+        at = canvas.rng.uniform(0, (canvas.width, canvas.height)).astype(int)
+        axes = (int(canvas.rng.uniform(8, 30)), int(canvas.rng.uniform(4, 14)))
+        angle, factor = canvas.rng.uniform(0, 180), float(canvas.rng.uniform(0.3, 0.6))
+        cv2.ellipse(light, at, axes, angle, 0, 360, factor, -1)
+    canvas.light *= cv2.GaussianBlur(light, (0, 0), blur_px)
+
+
+def cover(canvas: Canvas, H: np.ndarray, share: float, level: float, corner: bool) -> None:
+    """Cover a corner, or a strip along a side, of a marker of 11 modules with a flat level."""
+    window, x, y = _around(H, canvas)
+    cx, cy = np.rint(apply_homography(H, [[0, 0]])[0])
+    at = np.column_stack([x.ravel() + cx, y.ravel() + cy])
+    u, v = apply_homography(np.linalg.inv(H), at).T.reshape(2, *x.shape)
+    su, sv = canvas.rng.choice([-1, 1], 2)
+    if corner:
+        edge = 5.5 - 11 * np.sqrt(share)
+        covered = (su * u > edge) & (sv * v > edge)
+    else:
+        covered = (su * u if canvas.rng.random() < 0.5 else su * v) > 5.5 - 11 * share
+    covered &= (np.abs(u) < 7.5) & (np.abs(v) < 7.5)
+    canvas.light[window] = np.where(covered, level, canvas.light[window])
+
+
+def motion(canvas: Canvas, path_px: float) -> None:
+    """Steady motion during the exposure, in a random direction."""
+    half = int(np.ceil(path_px / 2)) + 1
+    kernel = np.zeros((2 * half + 1, 2 * half + 1))
+    a = canvas.rng.uniform(0, np.pi)
+    for s in (np.arange(400) + 0.5) / 400 - 0.5:
+        x, y = half + path_px * s * np.cos(a), half + path_px * s * np.sin(a)
+        i, j = int(x), int(y)
+        for dj, di in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            kernel[j + dj, i + di] += abs(1 - di - (x - i)) * abs(1 - dj - (y - j))
+    canvas.light = cv2.filter2D(canvas.light, -1, kernel / kernel.sum())

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from olivevib.arrays import Bools, Floats, Grey, Ints
 from olivevib.marker import MarkerLayout, MarkerLibrary
 
-
 TOGETHER = 1024  # readings at a time: memory stays small whatever an image holds
 
 

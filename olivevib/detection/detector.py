@@ -9,6 +9,7 @@ from olivevib.detection.detection import Detection, Reader
 from olivevib.detection.foreign import ForeignReader
 from olivevib.detection.paper import PaperReader
 from olivevib.detection.settings import DetectionSettings
+from olivevib.detection.template_reader import TemplateReader
 from olivevib.marker import MarkerLibrary
 
 
@@ -30,13 +31,24 @@ class Detector:
             raise ValueError(f"need a grey image (H, W) uint8, got {grey.shape} {grey.dtype}")
         return self._reader.detect(grey)
 
+    def mirrored_ids(self, grey: Grey) -> tuple[int, ...]:
+        """Ids seen as in a mirror: the recording is mirrored. Foreign families cannot tell: ()."""
+        if isinstance(self._reader, PaperReader | TemplateReader):
+            return self._reader.mirrored_ids(grey)
+        return ()
+
+
+def _olive(library: MarkerLibrary, settings: DetectionSettings) -> Reader:
+    reader = PaperReader if settings.mode == "paper" else TemplateReader
+    return reader(library, settings)
+
 
 def _foreign(library: MarkerLibrary, settings: DetectionSettings) -> Reader:
     return ForeignReader(library)
 
 
 _READERS: dict[str, Callable[[MarkerLibrary, DetectionSettings], Reader]] = {
-    "olive": PaperReader,
+    "olive": _olive,
     "aruco": _foreign,
     "apriltag": _foreign,
 }

@@ -1,6 +1,11 @@
 """Coded planar markers: the layout of location bars and code area, and libraries of codes."""
 
-from olivevib.marker.distances import CloseCodes, LibraryCheck, check_library
+from olivevib.marker.distances import (
+    CloseCodes,
+    LibraryCheck,
+    check_library,
+    false_match_probability,
+)
 from olivevib.marker.generation import generate_library
 from olivevib.marker.layout import MarkerLayout, MarkerLibrary
 from olivevib.marker.loading import load_library, shipped_libraries, shipped_text
@@ -12,6 +17,7 @@ __all__ = [
     "MarkerLayout",
     "MarkerLibrary",
     "check_library",
+    "false_match_probability",
     "generate_library",
     "library_text",
     "load_library",

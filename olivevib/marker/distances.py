@@ -6,6 +6,7 @@ the population count of the exclusive or.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -127,3 +128,14 @@ def _too_close(library: MarkerLibrary, table: Ints) -> tuple[CloseCodes, ...]:
         pair = (int(library.ids[m]), int(library.ids[n]))
         found.append(CloseCodes(*pair, view, int(nearest[m, n])))
     return tuple(found)
+
+
+def false_match_probability(library: MarkerLibrary, wrong: int) -> float:
+    """Upper limit of the chance that a random code area passes for one of the library's.
+
+    ``wrong``: unmatched modules that are accepted. A random pattern is within that distance of one
+    of 4 M turned codes with at most 4 M Σ C(c², k) / 2^(c²), k = 0…wrong.
+    """
+    bits = library.layout.code**2
+    near = sum(math.comb(bits, k) for k in range(wrong + 1))
+    return float(min(1.0, 4 * len(library.ids) * near / 2**bits))

@@ -1,0 +1,162 @@
+"""The fine detector in shadow, dappled sun, motion, behind leaves, and in bad pictures."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from rendered_markers import Canvas, Look, cover, dapple, motion, pose, shadow_edge
+from test_detection_paper import LIBRARY, PLACES, places
+
+from olivevib.detection.noise import autocorrelation
+from olivevib.detection.template import Blur
+from olivevib.detection.template_reader import TemplateReader
+from olivevib.marker import false_match_probability
+
+
+def scene(seed: int, size: float = 48, look: Look | None = None):
+    rng = np.random.default_rng(seed)
+    canvas = Canvas(look=look or Look(samples=6), rng=rng)
+    truth = {}
+    for k, place in enumerate(PLACES):
+        at = np.array(place) + rng.uniform(-5, 5, 2)
+        H = pose(11, size, rng.uniform(0, 50), rng.uniform(0, 360), rng.uniform(0, 360), at)
+        canvas.add(LIBRARY.layout.pattern(LIBRARY.codes[k]), H)
+        truth[int(LIBRARY.ids[k])] = H
+    return canvas, truth
+
+
+def measured(grey: np.ndarray, truth: dict) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Errors (n, 2) of the centres, whether flagged, and normalised squares; no id is wrong."""
+    found = TemplateReader(LIBRARY).detect(grey)
+    assert {d.id for d in found} <= set(truth)
+    errors = np.array([d.centre_px - places(truth[d.id])[0] for d in found])
+    normalised = [
+        e @ np.linalg.solve(d.centre_cov_px2, e) for d, e in zip(found, errors, strict=True)
+    ]
+    return errors, np.array([bool(d.flags) for d in found]), np.array(normalised)
+
+
+def rms(errors: np.ndarray) -> float:
+    return float(np.sqrt((errors**2).mean()))
+
+
+def test_a_hard_shadow_across_the_marker():
+    canvas, truth = scene(1)
+    for H in truth.values():
+        shadow_edge(canvas, H, 0.35, canvas.rng.uniform(-12, 12))
+    errors, flagged, _ = measured(canvas.grey(), truth)
+    assert len(errors) >= 23
+    assert rms(errors) < 0.03
+    assert flagged.all()
+
+
+def test_dappled_sun():
+    canvas, truth = scene(2)
+    dapple(canvas)
+    errors, flagged, normalised = measured(canvas.grey(), truth)
+    assert len(errors) >= 23
+    assert rms(errors) < 0.05
+    assert flagged[np.abs(errors).max(axis=1) > 0.1].all()
+    assert (normalised < 5.99).mean() > 0.8
+
+
+@pytest.mark.parametrize("level", [30.0, 220.0])
+@pytest.mark.parametrize("corner", [True, False])
+def test_a_cover_of_15_percent(level, corner):
+    canvas, truth = scene(3)
+    for H in truth.values():
+        cover(canvas, H, 0.15, level, corner)
+    errors, flagged, _ = measured(canvas.grey(), truth)
+    assert len(errors) == 24
+    assert rms(errors) < 0.02
+    assert np.abs(errors).max() < 0.05
+    assert flagged.mean() > 0.85
+
+
+@pytest.mark.slow
+def test_errors_under_a_cover_of_25_percent_are_flagged():
+    for corner in (True, False):
+        for level in (30.0, 220.0):
+            canvas, truth = scene(4)
+            for H in truth.values():
+                cover(canvas, H, 0.25, level, corner)
+            errors, flagged, _ = measured(canvas.grey(), truth)
+            if len(errors):
+                assert flagged[np.abs(errors).max(axis=1) > 0.1].all()
+
+
+@pytest.mark.parametrize(("path", "share", "limit"), [(6, 1.0, 0.010), (9, 0.85, 0.012)])
+def test_motion_blur(path, share, limit):
+    canvas, truth = scene(5)
+    motion(canvas, path)
+    errors, _, _ = measured(canvas.grey(), truth)
+    assert len(errors) >= share * 24
+    assert rms(errors) < limit
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("psf", [0.4, 1.0, 1.5])
+def test_an_unknown_point_spread(psf):
+    canvas, truth = scene(6, look=Look(samples=20, psf_px=psf))
+    errors, flagged, normalised = measured(canvas.grey(), truth)
+    assert len(errors) == 24
+    assert not flagged.any()
+    assert rms(errors) < {0.4: 0.0022, 1.0: 0.0038, 1.5: 0.0050}[psf]
+    assert (normalised < 5.99).mean() > 0.8
+
+
+def jpeg(canvas: Canvas) -> np.ndarray:
+    packed = cv2.imencode(".jpg", canvas.grey(), [cv2.IMWRITE_JPEG_QUALITY, 50])[1]
+    return cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE)
+
+
+def demosaiced(canvas: Canvas) -> np.ndarray:
+    noise = cv2.GaussianBlur(canvas.rng.normal(0, 5, canvas.light.shape), (0, 0), 0.7)
+    return np.clip(np.rint(canvas.light + noise), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("spoilt", [jpeg, demosaiced])
+def test_ellipses_hold_where_noise_is_correlated(spoilt):
+    canvas, truth = scene(7, look=Look(samples=8))
+    errors, flagged, normalised = measured(spoilt(canvas), truth)
+    assert len(errors) == 24
+    assert not flagged.any()
+    assert rms(errors) < 0.008
+    assert (normalised < 5.99).mean() >= 0.83  # 20 of 24; 95 % expected
+    assert np.mean(normalised) < 4
+
+
+def test_autocorrelation_of_white_and_of_smoothed_noise():
+    rng = np.random.default_rng(1)
+    noise = np.zeros((84, 84), np.float32)
+    seen = np.zeros_like(noise)
+    seen[2:-2, 2:-2] = 1
+    white = rng.normal(0, 3, (80, 80))
+    noise[2:-2, 2:-2] = white
+    kernel = autocorrelation(noise, seen)
+    assert kernel[2, 2] == pytest.approx(9, rel=0.05)
+    assert np.count_nonzero(kernel) <= 3
+    noise[2:-2, 2:-2] = cv2.GaussianBlur(white, (0, 0), 0.8)
+    kernel = autocorrelation(noise, seen)
+    assert np.count_nonzero(kernel) > 8
+    assert kernel[2, 3] / kernel[2, 2] == pytest.approx(np.exp(-1 / (4 * 0.64)), abs=0.08)
+    assert np.array_equal(kernel, kernel[::-1, ::-1])
+
+
+def test_false_matches_are_as_rare_as_stated():
+    """Random readings of a small code match as often as the formula says."""
+    from olivevib.detection.codes import CodeBook
+
+    library = LIBRARY.only(tuple(range(1, 65)))
+    assert false_match_probability(library, 4) == pytest.approx(
+        1.1e-7, rel=0.1
+    )  # knowledge: N = 64
+    rng = np.random.default_rng(3)
+    read = rng.integers(0, 2, (40_000, 7, 7)).astype(bool)
+    matches = (CodeBook(library.codes).match(read).mismatches <= 11).mean()
+    assert matches == pytest.approx(false_match_probability(library, 11), rel=0.15)
+
+
+def test_blur_reaches_half_its_path_and_two_sigma():
+    assert Blur(1.0, (3.0, 4.0)).half_width_px == pytest.approx(4.5)
