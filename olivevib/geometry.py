@@ -90,7 +90,9 @@ class CameraModel:
 
         OpenCV's fixed point with 20 steps: 3e-8 px where five steps are 0.4 px off in a corner.
         """
-        pixels = np.asarray(px, dtype=np.float64).reshape(-1, 2)
+        pixels = np.array(px, dtype=np.float64).reshape(-1, 2)
+        # undistortPoints takes K for a camera without skew
+        pixels[:, 0] -= self.K[0, 1] * (pixels[:, 1] - self.K[1, 2]) / self.K[1, 1]
         out = np.full((len(pixels), 3), np.nan)
         good = np.isfinite(pixels).all(axis=1)
         if good.any():

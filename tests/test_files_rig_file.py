@@ -210,6 +210,16 @@ def test_no_toml_names_the_line(tmp_path: Path) -> None:
         read_rig(tmp_path / "none.toml")
 
 
+def test_skew_of_the_closed_form_comes_back(tmp_path: Path) -> None:
+    made = rig()
+    K = made.left.K.copy()
+    K[0, 1] = -3.7281
+    skewed = replace(made, left=replace(made.left, K=K))
+    write_rig(tmp_path / "rig.toml", skewed, {})
+    same(read_rig(tmp_path / "rig.toml"), skewed)
+    assert tomllib.loads((tmp_path / "rig.toml").read_text())["left"]["skew"] == -3.7281
+
+
 def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
     made = rig()
     K = made.left.K.copy()

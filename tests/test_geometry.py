@@ -60,6 +60,14 @@ def test_ray_undoes_projection_in_the_corners():
     assert np.isnan(rays[3]).all()
 
 
+def test_ray_undoes_the_projection_of_a_camera_with_skew():
+    skewed = K + np.array([[0.0, 7.5, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    one, corner = CameraModel((1280, 720), skewed, LENS), np.array([[3.0, 2.0], [1270.0, 715.0]])
+    given = corner.copy()
+    assert np.abs(one.project(one.ray(corner) * 1000) - corner).max() < 1e-5
+    assert np.array_equal(corner, given)
+
+
 def test_points_behind_the_camera_have_no_image():
     assert np.isnan(camera().project([[10.0, 10.0, -500.0]])).all()
 
