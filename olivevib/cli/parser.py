@@ -147,6 +147,20 @@ def _stage_verbs(verbs: Any) -> None:
     run = _add(verbs, "run", "stages:run", "every stage that is missing or stale, in order")
     run.add_argument("trials", nargs="+", metavar="TRIAL")
     _set_option(run)
+    batch = _add(verbs, "batch", "batch:batch", "run and report many trials, in parallel", _BATCH)
+    batch.add_argument("trials", nargs="+", metavar="TRIAL", help="trials, or folders of trials")
+    where = batch.add_mutually_exclusive_group()
+    where.add_argument("--workers", type=int, metavar="N", help="processes here (default: cores)")
+    where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster instead")
+    batch.add_argument("--json", action="store_true", help="results as JSON, for programs")
+
+
+_BATCH = """\
+prints a line a trial: its name and the hash of its results, equal wherever it was measured.
+What is done is skipped; the same command goes on after Ctrl-C, a kill or a power cut.
+a cluster on this machine: dask scheduler --host 127.0.0.1
+                           dask worker tcp://127.0.0.1:8786 --nworkers 2 --nthreads 1
+"""
 
 
 def _set_option(parser: Any) -> None:

@@ -1,0 +1,188 @@
+"""A batch on a Dask cluster: the scheduler hands trials to workers that see the same folders.
+
+Whoever reaches a scheduler without TLS can run any code on its workers; so it is loopback or TLS.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import queue
+import threading
+import time
+import uuid
+from collections.abc import Generator, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from olivevib.batch.outlook import Outlook
+from olivevib.batch.result import TrialResult
+from olivevib.errors import InputError, OlivevibError, UsageError
+from olivevib.progress import Cancelled, Tick, silent
+
+POLL_S = 0.25
+ANSWERS_IN = "10s"
+START = (
+    "Start one: dask scheduler --host 127.0.0.1, then a worker a core: "
+    "dask worker ADDRESS --nworkers 2 --nthreads 1"
+)
+
+
+def measure_on_cluster(
+    trials: Sequence[Path], address: str, tick: Tick = silent
+) -> Generator[TrialResult, None, None]:
+    """Measure every trial on the workers of a Dask scheduler; yields results as they come.
+
+    Workers must see the trials under the same names. A trial whose worker dies goes to another
+    one, as often as the scheduler's allowed-failures say. When the tick raises, waiting trials
+    are withdrawn and running ones stop at the next safe place. Raises UsageError for an address
+    that is neither loopback nor TLS or where distributed is not installed, InputError where no
+    scheduler answers.
+    """
+    check_address(address)
+    client = _connect(address)
+    try:
+        yield from _results(client, [str(t) for t in trials], tick)
+    finally:
+        client.close()
+
+
+def check_address(address: str) -> None:
+    """UsageError where the address is neither on this machine nor behind TLS."""
+    scheme, host = _parts(address)
+    if scheme == "tls" or (scheme == "tcp" and _is_here(host)):
+        return
+    if scheme != "tcp":
+        raise UsageError(
+            f"--scheduler {address} is no address of a scheduler.",
+            "",
+            "Write tcp://127.0.0.1:8786 on this machine, tls://HOST:8786 for another one.",
+        )
+    raise UsageError(
+        f"--scheduler {address} is on another machine and not encrypted.",
+        "Whoever reaches a Dask scheduler without TLS can run any code on its workers.",
+        "Set up TLS (https://distributed.dask.org/en/stable/tls.html) and write "
+        f"tls://{host or 'HOST'}:8786, or tunnel it: ssh -L 8786:localhost:8786 "
+        f"{host or 'HOST'}, and write tcp://127.0.0.1:8786.",
+    )
+
+
+def _parts(address: str) -> tuple[str, str]:
+    """Scheme (tcp where none is written) and host of an address; empty where there is none."""
+    try:
+        parts = urlsplit(address if "://" in address else f"tcp://{address}")
+        return parts.scheme, parts.hostname or ""
+    except ValueError:
+        return "", ""
+
+
+def _is_here(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _connect(address: str) -> Any:
+    try:
+        import distributed
+    except ImportError as error:
+        raise UsageError(
+            "batch on a cluster needs the package distributed, which is not installed.",
+            "",
+            "Install it: pip install 'olivevib[cluster]'; --workers N needs nothing more.",
+        ) from error
+    try:
+        return distributed.Client(address, timeout=ANSWERS_IN, set_as_default=False)
+    except (OSError, TypeError, ValueError, RuntimeError) as error:
+        raise InputError(f"no scheduler answers at {address}.", f"{error}", START) from error
+
+
+def _results(client: Any, trials: list[str], tick: Tick) -> Iterator[TrialResult]:
+    inbox: queue.Queue[Any] = queue.Queue()
+    outlook = Outlook(len(trials), len(trials))
+    batch = uuid.uuid4().hex
+    futures = {}
+    for number, trial in enumerate(trials):
+        key = f"{Path(trial).name}-{batch}-{number}"
+        futures[key] = client.submit(measure_remotely, trial, key=key, pure=False)
+    by_key = dict(zip(futures, trials, strict=True))
+    for future in futures.values():
+        future.add_done_callback(inbox.put)
+    try:
+        while outlook.left:
+            outlook.note(_who_works(client))
+            tick(*outlook.progress())
+            try:
+                future = inbox.get(timeout=POLL_S)
+            except queue.Empty:
+                continue
+            result = _result(future, by_key[future.key])
+            del futures[future.key]
+            outlook.finished(result)
+            yield result
+        tick(*outlook.progress())
+    finally:
+        client.cancel(list(futures.values()))
+
+
+def _who_works(client: Any) -> str:
+    count = len(client.nthreads())
+    return f"{count} workers" if count else "no worker is connected yet"
+
+
+def _result(future: Any, trial: str) -> TrialResult:
+    if future.status == "finished":
+        return TrialResult.from_json(future.result())
+    try:
+        reason = str(future.exception()) if future.status == "error" else "the scheduler was lost"
+    except Exception as error:  # an answer that cannot even be read here
+        reason = str(error)
+    return TrialResult.failure(
+        trial,
+        OlivevibError(
+            f"{Path(trial).name} came back without a result.",
+            reason.strip()[:500],
+            "Check that every worker has this olivevib and sees the trial under the same name, "
+            "and look into the workers' logs; then run the same command again.",
+        ),
+    )
+
+
+# --- on the workers -----------------------------------------------------------------------
+
+_ONE_TRIAL = threading.Lock()  # a worker with several threads measures one trial at a time
+_LOOKS_S = 0.5
+
+
+def measure_remotely(trial: str) -> str:
+    """The task that a worker runs: one trial; the result as JSON."""
+    from olivevib.batch.unit import measure, use_one_core
+
+    watch = _Withdrawn()
+    use_one_core()
+    while not _ONE_TRIAL.acquire(timeout=_LOOKS_S):
+        watch(0, None, "")
+    try:
+        return measure(Path(trial), watch).to_json()
+    finally:
+        _ONE_TRIAL.release()
+
+
+class _Withdrawn:
+    """The tick on a worker: raises Cancelled once nobody wants this task any more."""
+
+    def __init__(self) -> None:
+        from distributed.worker import get_worker, thread_state
+
+        self._tasks, self._key = get_worker().state.tasks, thread_state.key
+        self._looked = float("-inf")
+
+    def __call__(self, done: int, total: int | None, note: str) -> None:
+        """Look now and then."""
+        if time.monotonic() - self._looked < _LOOKS_S:
+            return
+        self._looked = time.monotonic()
+        task = self._tasks.get(self._key)
+        if task is None or task.state == "cancelled":
+            raise Cancelled
