@@ -34,6 +34,16 @@ def band(text: str | None) -> tuple[float, float] | None:
     return limits
 
 
+def picture_size(text: str | None) -> tuple[int, int] | None:
+    """Width and height (1280, 720) of "1280x720"; None for None. UsageError for anything else."""
+    if text is None:
+        return None
+    width, _, height = text.lower().partition("x")
+    if not (width.isdigit() and height.isdigit() and int(width) > 0 and int(height) > 0):
+        raise UsageError(f"--size {text!r} is no picture size.", "", "Write it as 1280x720.")
+    return int(width), int(height)
+
+
 def row_times(text: str | None) -> tuple[float | None, float | None]:
     """Row times of left and right, µs, of "27.8" or "27.8,-27.8"; UsageError otherwise."""
     if text is None:

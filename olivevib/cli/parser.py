@@ -74,6 +74,7 @@ def _common(parser: Any) -> None:
 def _prepare_verbs(verbs: Any) -> None:
     init = _add(verbs, "init", "prepare:init", "make a workspace: trials/ reports/ markers/")
     init.add_argument("dir", nargs="?", default=".", metavar="DIR")
+    _capture_verb(verbs)
     new = _add(verbs, "new", "prepare:new", "make a trial from two recordings", _NEW_MORE)
     new.add_argument("trial", metavar="TRIAL", help="a folder, or a name under trials/")
     new.add_argument("--left", required=True, metavar="FILE", help="recording of the left camera")
@@ -95,6 +96,30 @@ def _prepare_verbs(verbs: Any) -> None:
     new.add_argument("--link", action="store_true", help="leave the recordings where they are")
 
 
+def _capture_verb(verbs: Any) -> None:
+    help_ = "record a trial with two cameras at this computer"
+    parser = _add(verbs, "capture", "capture:capture", help_, _CAPTURE_MORE)
+    parser.add_argument("trial", metavar="TRIAL", help="a folder, or a name under trials/")
+    parser.add_argument("--left", required=True, metavar="DEVICE", help="the left camera")
+    parser.add_argument("--right", required=True, metavar="DEVICE", help="the right camera")
+    parser.add_argument("--seconds", type=float, metavar="S", help="length (default: to Ctrl-C)")
+    parser.add_argument("--size", metavar="WxH", help="picture size, such as 1280x720")
+    parser.add_argument("--fps", type=float, metavar="N", help="frames a second")
+    parser.add_argument("--board", metavar="SPEC", help="record the calibration board instead")
+    parser.add_argument("--markers", metavar="LIB", default="olive49", help="marker library")
+    parser.add_argument("--ids", metavar="1,2,5-9", help="the markers on the tree")
+    parser.add_argument("--marker-size", type=float, metavar="MM", help=_SIZE)
+    parser.add_argument("--band", metavar="5-45", help="where the shaker's frequency may lie, Hz")
+    parser.add_argument("--no-preview", action="store_true", help="decode nothing while recording")
+
+
+_CAPTURE_MORE = """\
+cameras: a number or part of the name as olivevib doctor lists them, /dev/video0, the http://
+address of an MJPEG stream, a named pipe of JPEG pictures; to rehearse: the file of a recording,
+a folder of JPEG stills, simulated:demo, pattern:
+The board goes into TRIAL/calibration, before or after the tree. What the camera sends is recorded
+as it is, with a side-car of time stamps and checksums.
+"""
 _NEW_MORE = """\
 boards (columns x rows, mm):
   coded:5x5,pitch=60,size=44[,first=1]       charuco:4x5,square=54,marker=40.5,dict=DICT_4X4_1000

@@ -17,6 +17,7 @@ import numpy as np
 
 from olivevib.arrays import Floats
 from olivevib.errors import InputError, UsageError
+from olivevib.files.capture.sidecar import SideCar, read_sidecar
 
 TIMES = (
     *("frame_time", "stamp", "timestamp", "time_stamp", "frame_timestamp", "time", "t"),
@@ -64,17 +65,34 @@ def read_stamp_file(path: str | Path, video_name: str, frames: int) -> Floats:
     holds another number of stamps than the video has frames, or stamps that do not increase.
     """
     file, asked = _split(path)
+    sidecar = read_sidecar(file) if file.is_file() else None
+    if sidecar is not None:
+        return _of_recorder(sidecar, video_name, frames)
     rows = _rows(file)
     camera = _camera(file, rows, video_name, asked)
     mine = [row for row in rows if camera is None or row.camera == camera]
     if len(mine) != frames:
         whose = "" if camera is None else f" for camera {camera}"
-        raise InputError(
-            f"{file} holds {len(mine)} time stamps{whose}, but {video_name} has {frames} frames.",
-            "They must belong to the same recording, one stamp a frame.",
-            "Give the stamp file of this recording, or cut neither of the two.",
-        )
+        raise _wrong_count(file, len(mine), whose, video_name, frames)
     return _in_order(file, mine)
+
+
+def _of_recorder(sidecar: SideCar, video_name: str, frames: int) -> Floats:
+    """Stamps from the side-car of olivevib's own recorder: line k belongs to frame k.
+
+    A recorder that was killed may have left the line of a frame that it could not write any more.
+    """
+    if len(sidecar.lines) < frames:
+        raise _wrong_count(sidecar.path, len(sidecar.lines), "", video_name, frames)
+    return np.array([line.stamp_us * 1e-6 for line in sidecar.lines[:frames]], dtype=np.float64)
+
+
+def _wrong_count(file: Path, found: int, whose: str, video_name: str, frames: int) -> InputError:
+    return InputError(
+        f"{file} holds {found} time stamps{whose}, but {video_name} has {frames} frames.",
+        "They must belong to the same recording, one stamp a frame.",
+        "Give the stamp file of this recording, or cut neither of the two.",
+    )
 
 
 def pick_camera(path: str | Path, video_name: str) -> str | None:

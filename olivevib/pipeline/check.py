@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from olivevib.errors import OlivevibError
+from olivevib.files.capture import verify
 from olivevib.files.rig_file import read_rig
 from olivevib.files.stills import open_source
 from olivevib.files.store import read_stage
@@ -48,6 +49,7 @@ def _recordings(trial: Trial, tick: Tick) -> Iterator[Finding]:
         if name and (side, name) not in seen:
             seen.add((side, name))
             yield _recording(trial.path(name), name, side, tick)
+            yield from _checksums(trial.path(name), name, tick)
 
 
 def _recording(path: Path, name: str, side: str, tick: Tick) -> Finding:
@@ -62,6 +64,20 @@ def _recording(path: Path, name: str, side: str, tick: Tick) -> Finding:
         return Finding("lost", name, f"{error}")
     told = "; ".join(c.text for c in cautions)
     return Finding("damaged" if told else "whole", name, told or f"{frames} frames")
+
+
+def _checksums(path: Path, name: str, tick: Tick) -> Iterator[Finding]:
+    """Every frame against the side-car that olivevib's recorder wrote beside it, where there is one."""
+    if path.is_dir():
+        return
+    try:
+        verified = verify(path, tick)
+    except OlivevibError as error:
+        yield Finding("lost", f"{name}, checksums", f"{error}")
+        return
+    if verified is not None:
+        state = "whole" if verified.whole else "damaged"
+        yield Finding(state, f"{name}, checksums", verified.words)
 
 
 def _sensors(trial: Trial) -> Iterator[Finding]:

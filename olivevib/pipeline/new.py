@@ -13,6 +13,7 @@ from tomlkit.items import Table
 from olivevib.calibration.boards import parse_board
 from olivevib.errors import InputError, UsageError
 from olivevib.files.atomic import as_input_error
+from olivevib.files.capture import sidecar_of
 from olivevib.files.stamps import pick_camera
 from olivevib.files.stills import IMAGE_SUFFIXES
 from olivevib.files.video import Video
@@ -64,7 +65,7 @@ def new_trial(folder: Path, plan: NewTrial, tick: Tick = silent) -> Trial:
     shutil.rmtree(part, ignore_errors=True)
     try:
         part.mkdir(parents=True)
-        places = _place(part, plan, tick)
+        places = _place(part, folder, plan, tick)
         (part / FILE).write_text(tomlkit.dumps(_document(plan, places)), encoding="utf-8")
         if folder.exists():
             _merge_into(part, folder)
@@ -163,8 +164,27 @@ class _Places:
         return self.names[path] if path else None
 
 
-def _place(part: Path, plan: NewTrial, tick: Tick) -> _Places:
-    """Copy the recordings into the trial, or name them where they are."""
+def _place(part: Path, folder: Path, plan: NewTrial, tick: Tick) -> _Places:
+    """Copy the recordings into the trial, or name them where they are.
+
+    What lies in the trial's folder already (``olivevib capture`` puts it there) stays there.
+    """
+    wanted = _wanted(plan)
+    home = folder.resolve()
+    for done, (source, name) in enumerate(wanted.items()):
+        tick(done, len(wanted), "copying recordings" if not plan.link else "checking recordings")
+        file = Path(source.split("#")[0])
+        if file.resolve().is_relative_to(home):
+            wanted[source] = file.resolve().relative_to(home).as_posix()
+        elif plan.link:
+            wanted[source] = str(file.resolve())
+        else:
+            _copy(file, part / name.split("#")[0])
+    return _Places(wanted)
+
+
+def _wanted(plan: NewTrial) -> dict[str, str]:
+    """Every file of the plan and the name it gets in the trial."""
     wanted: dict[str, str] = {}  # source -> name in the trial
     for side in SIDES:
         source = getattr(plan, side)
@@ -185,13 +205,7 @@ def _place(part: Path, plan: NewTrial, tick: Tick) -> _Places:
         wanted.setdefault(plan.rig, "shared_rig.toml")
     if plan.markers.endswith(".toml"):
         wanted.setdefault(plan.markers, Path(plan.markers).name)
-    for done, (source, name) in enumerate(wanted.items()):
-        tick(done, len(wanted), "copying recordings" if not plan.link else "checking recordings")
-        if plan.link:
-            wanted[source] = str(Path(source.split("#")[0]).resolve())
-        else:
-            _copy(Path(source.split("#")[0]), part / name.split("#")[0])
-    return _Places(wanted)
+    return wanted
 
 
 def _copy(source: Path, target: Path) -> None:
@@ -201,8 +215,10 @@ def _copy(source: Path, target: Path) -> None:
         for still in sorted(source.iterdir()):
             if still.suffix.lower() in IMAGE_SUFFIXES:
                 shutil.copyfile(still, target / still.name)
-    else:
-        shutil.copyfile(source, target)
+        return
+    shutil.copyfile(source, target)
+    if sidecar_of(source).is_file():  # the checksums of a recording go with it
+        shutil.copyfile(sidecar_of(source), sidecar_of(target))
 
 
 def _document(plan: NewTrial, places: _Places) -> tomlkit.TOMLDocument:

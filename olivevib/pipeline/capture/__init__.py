@@ -1,0 +1,39 @@
+"""Recording a trial: what the command line and the app share."""
+
+from olivevib.pipeline.capture.coverage import BoardCoverage, Coverage
+from olivevib.pipeline.capture.looks import Look, advise
+from olivevib.pipeline.capture.plan import (
+    CameraState,
+    Captured,
+    CapturePlan,
+    CaptureState,
+    Watch,
+    unwatched,
+)
+from olivevib.pipeline.capture.prompts import Prompt, Prompter
+from olivevib.pipeline.capture.record import capture
+from olivevib.pipeline.capture.trial import board_in, place_of, trial_from
+from olivevib.pipeline.capture.verdict import CameraResult, Verdict, good_for, judge
+
+__all__ = [
+    "BoardCoverage",
+    "CameraResult",
+    "CameraState",
+    "CapturePlan",
+    "CaptureState",
+    "Captured",
+    "Coverage",
+    "Look",
+    "Prompt",
+    "Prompter",
+    "Verdict",
+    "Watch",
+    "advise",
+    "board_in",
+    "capture",
+    "good_for",
+    "judge",
+    "place_of",
+    "trial_from",
+    "unwatched",
+]

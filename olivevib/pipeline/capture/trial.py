@@ -1,0 +1,90 @@
+"""From recordings to a trial: what was captured is named in trial.toml, where it already lies."""
+
+from __future__ import annotations
+
+import tomllib
+from contextlib import suppress
+from pathlib import Path
+
+from olivevib.errors import UsageError
+from olivevib.files.capture import sidecar_of
+from olivevib.pipeline.capture.plan import Captured, CapturePlan
+from olivevib.pipeline.capture.record import RECORD
+from olivevib.pipeline.new import NewTrial, new_trial
+from olivevib.progress import Tick, silent
+from olivevib.trial import Trial
+from olivevib.trial.document import FILE
+
+CALIBRATION = "calibration"
+
+
+def place_of(folder: Path, plan: CapturePlan) -> Path:
+    """Where the recordings of a trial go: into its folder, the board's into calibration/.
+
+    UsageError for the tree of a trial that has its recordings already.
+    """
+    if plan.board is not None:
+        return folder / CALIBRATION
+    if (folder / FILE).exists():
+        raise UsageError(
+            f"{folder} is a trial already.",
+            "A capture never overwrites one.",
+            "Choose another name; --board SPEC records the calibration board of this trial.",
+        )
+    return folder
+
+
+def trial_from(
+    folder: Path,
+    plan: CapturePlan,
+    captured: Captured,
+    size_mm: float | None = None,
+    tick: Tick = silent,
+) -> Trial | None:
+    """Make the trial of a captured tree, or tell a trial of its captured board.
+
+    None where the recordings of both cameras are not there (yet): a board that was captured before
+    the tree waits in calibration/ and is found by it. size_mm: outer side of the markers.
+    """
+    if len(captured.videos) < 2:
+        return None
+    if plan.board is not None:
+        return _with_board(folder, plan) if (folder / FILE).exists() else None
+    left, right = (captured.videos[side] for side in ("left", "right"))
+    board = board_in(folder)
+    calibration = {side: folder / CALIBRATION / f"{side}.nut" for side in ("left", "right")}
+    told = NewTrial(
+        left=str(left),
+        right=str(right),
+        left_stamps=str(sidecar_of(left)),
+        right_stamps=str(sidecar_of(right)),
+        calibration_left=str(calibration["left"]) if board else None,
+        calibration_right=str(calibration["right"]) if board else None,
+        board=board,
+        markers=plan.markers,
+        ids=plan.ids,
+        size_mm=size_mm,
+        band_hz=plan.band_hz,
+        simulated=any(name.startswith("simulated:") for name in (plan.left, plan.right)),
+    )
+    return new_trial(folder, told, tick)
+
+
+def board_in(folder: Path) -> str | None:
+    """The SPEC of the board that was captured for this trial; None where none was."""
+    with suppress(OSError, tomllib.TOMLDecodeError):
+        told = tomllib.loads((folder / CALIBRATION / RECORD).read_text(encoding="utf-8"))
+        there = all((folder / CALIBRATION / f"{side}.nut").is_file() for side in ("left", "right"))
+        if there and isinstance(told.get("board"), str):
+            return str(told["board"])
+    return None
+
+
+def _with_board(folder: Path, plan: CapturePlan) -> Trial:
+    return Trial.open(folder).changed(
+        {
+            "calibration.left": f"{CALIBRATION}/left.nut",
+            "calibration.right": f"{CALIBRATION}/right.nut",
+            "calibration.board": plan.board,
+        }
+    )

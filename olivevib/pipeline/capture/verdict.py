@@ -1,0 +1,239 @@
+"""At once after a recording: what is in it, and what it is good for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olivevib.arrays import Floats
+from olivevib.errors import Caution
+from olivevib.pipeline.capture.coverage import Coverage
+from olivevib.pipeline.capture.looks import BLUR_PX, SATURATED_SHARE
+from olivevib.signals import StampFit, fit_stamps
+
+BAND_HZ = (5.0, 45.0)
+SLOW_SHARE = 0.95  # of the promised frame rate
+SEEN_SHARE = 0.5  # of the looks in which a marker must have been seen by both cameras
+LEAST_S = 8.0
+IN_STEP, HALF_STEP = 0.08, 0.08  # of a frame: nearer to 0 or to a half than that helps less
+
+
+@dataclass(frozen=True)
+class CameraResult:
+    """What one camera delivered.
+
+    stamps_s (N,) of the recorded frames; promised_fps None: it promised nothing; seen: id to the
+    share of looks that showed it; looks: how many frames were decoded; losses: how often it
+    went away; ended: why it stopped; blur_px, saturated: medians over the looks, NaN without any.
+    """
+
+    side: str
+    stamps_s: Floats
+    promised_fps: float | None
+    seen: Mapping[int, float]
+    looks: int
+    losses: int
+    ended: str
+    blur_px: float = math.nan
+    saturated: float = math.nan
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """words: one sentence; fits: the clock of each camera's stamps, None for fewer than two frames;
+    offset_s: right minus left, modulo a frame, NaN where unknown.
+    """
+
+    words: str
+    offset_s: float
+    fits: Mapping[str, StampFit | None]
+    cautions: tuple[Caution, ...]
+
+
+def judge(
+    results: Sequence[CameraResult], band_hz: tuple[float, float] | None, wanted: Sequence[int]
+) -> Verdict:
+    """The verdict on both cameras' recordings of a tree.
+
+    wanted: the ids that hang on the tree, empty if nobody said so: then those that were seen.
+    """
+    fits = {r.side: _fit(r.stamps_s) for r in results}
+    both = [fits.get(side) for side in ("left", "right")]
+    offset = math.nan
+    if both[0] is not None and both[1] is not None:
+        offset = camera_offset_s(both[0], both[1])
+    cautions = [c for r in results for c in _camera_cautions(r, fits[r.side])]
+    known, seen = _markers(results, wanted)
+    if any(r.looks for r in results):
+        cautions += _marker_cautions(known, seen)
+    dropped = sum(int(f.dropped.size) for f in fits.values() if f is not None)
+    parts = [f"{len(seen)} of {len(known)} markers"] if any(r.looks for r in results) else []
+    parts.append(f"{dropped} drops")
+    if math.isfinite(offset):
+        parts.append(f"cameras {abs(offset) * 1000:.1f} ms apart")
+    fps = min((f.rate_hz for f in fits.values() if f is not None), default=0.0)
+    reach = good_for(fps, offset, band_hz or BAND_HZ)
+    return Verdict(f"{', '.join(parts)}: {reach}", offset, fits, tuple(cautions))
+
+
+def judge_board(results: Sequence[CameraResult], coverage: Coverage | None) -> Verdict:
+    """The verdict on a recording of the calibration board."""
+    fits = {r.side: _fit(r.stamps_s) for r in results}
+    cautions = [c for r in results for c in _camera_cautions(r, fits[r.side])]
+    if coverage is None:
+        return Verdict("the board was recorded, unwatched", math.nan, fits, tuple(cautions))
+    shares = ", ".join(
+        f"{share:.0%} of the {side} picture" for side, share in coverage.cells.items()
+    )
+    words = f"{coverage.pairs} views in both cameras, {shares}: "
+    if not coverage.enough:
+        cautions.append(
+            Caution(
+                "board-coverage-thin",
+                "The board was not shown everywhere it should be.",
+                f"Record it again, and {coverage.words}.",
+            )
+        )
+    words += "enough for the calibration" if coverage.enough else coverage.words
+    return Verdict(words, math.nan, fits, tuple(cautions))
+
+
+def _cells(coverage: Coverage) -> list[tuple[str, float]]:
+    return sorted(coverage.cells.items())
+
+
+def _fit(stamps_s: Floats) -> StampFit | None:
+    return fit_stamps(stamps_s) if stamps_s.size > 1 else None
+
+
+def camera_offset_s(left: StampFit, right: StampFit) -> float:
+    """Right minus left, modulo a left frame, s: the middle of all frames, in -half … half."""
+    period = 1.0 / left.rate_hz
+    since = (right.t_s - left.t_s[0]) / period
+    turn = np.angle(np.mean(np.exp(2j * np.pi * since)))
+    return float(turn / (2 * np.pi) * period)
+
+
+def good_for(fps: float, offset_s: float, band_hz: tuple[float, float]) -> str:
+    """What frequencies two cameras with this rate and offset can measure, in words.
+
+    Above half the frame rate a line is decided by the instants of the sensor rows and by the
+    offset between the cameras; in step, the frame rate's neighbourhood looks like sway, and half
+    a frame apart f looks like 2 fps - f (knowledge of the field: sampling time, 5.3 and 10).
+    """
+    low, high = band_hz
+    if fps <= 0:
+        return "nothing was recorded"
+    if fps >= 2 * high:
+        return f"good for {low:g}–{high:g} Hz"
+    direct = fps / 2
+    limit = min(high, 1.5 * fps)
+    if math.isnan(offset_s):
+        return f"good for {low:g}–{direct:.0f} Hz"
+    share = abs(offset_s) * fps
+    if limit <= fps * 11 / 12:
+        blind = ""
+    elif share < IN_STEP:
+        blind = f" except {fps * 11 / 12:.1f}–{min(limit, fps * 13 / 12):.1f} Hz (cameras in step)"
+    else:
+        blind = f" except {fps - 0.3:.1f}–{fps + 0.3:.1f} Hz"
+    if share > 0.5 - HALF_STEP:
+        blind += f"; half a frame apart, f and {2 * fps:.0f} - f look alike"
+    return (
+        f"good for {low:g}–{limit:g} Hz{blind} "
+        f"(above {direct:.0f} Hz it takes rolling shutters with known row times)"
+    )
+
+
+def _markers(results: Sequence[CameraResult], wanted: Sequence[int]) -> tuple[list[int], list[int]]:
+    """The markers that should be seen, and those that both cameras saw often enough."""
+    every = sorted({i for r in results for i in r.seen})
+    known = list(wanted) or every
+    looked = [r for r in results if r.looks]
+    seen = [i for i in known if all(r.seen.get(i, 0.0) >= SEEN_SHARE for r in looked)]
+    return known, seen if looked else []
+
+
+def _camera_cautions(result: CameraResult, fit: StampFit | None) -> list[Caution]:
+    side, out = result.side, []
+    if fit is None:
+        return [
+            Caution(
+                "camera-delivered-nothing",
+                f"The {side} camera delivered {result.stamps_s.size} frames ({result.ended}).",
+                "Check its cable and that no other program uses it; olivevib doctor lists cameras.",
+            )
+        ]
+    if result.losses:
+        out.append(
+            Caution(
+                "camera-vanished",
+                f"The {side} camera went away {result.losses} time(s) ({result.ended}).",
+                "What it delivered is recorded. Check plug and cable, or move nearer to the "
+                "access point; record again if the shaking was lost.",
+            )
+        )
+    if fit.dropped.size:
+        out.append(
+            Caution(
+                "dropped-frames",
+                f"The {side} camera skipped {fit.dropped.size} of {int(fit.sequence[-1]) + 1} "
+                "frames.",
+                "Use another USB port for each camera and close other programs.",
+            )
+        )
+    promised = result.promised_fps
+    if promised and fit.rate_hz < SLOW_SHARE * promised:
+        out.append(
+            Caution(
+                "frame-rate-low",
+                f"The {side} camera ran at {fit.rate_hz:.1f} instead of {promised:g} frames/s.",
+                "Switch automatic exposure and its priority (dynamic frame rate) off; add light.",
+            )
+        )
+    return out + _picture_cautions(result)
+
+
+def _picture_cautions(result: CameraResult) -> list[Caution]:
+    out = []
+    if result.blur_px > BLUR_PX:
+        out.append(
+            Caution(
+                "picture-blurred",
+                f"Markers of the {result.side} camera are blurred by {result.blur_px:.1f} px.",
+                "Focus by hand on the markers and shorten the exposure to 2 ms or less.",
+            )
+        )
+    if result.saturated > SATURATED_SHARE:
+        out.append(
+            Caution(
+                "picture-saturated",
+                f"{result.saturated:.0%} of the {result.side} camera's markers are too bright.",
+                "Halve the exposure, or shade the markers.",
+            )
+        )
+    return out
+
+
+def _marker_cautions(known: Sequence[int], seen: Sequence[int]) -> list[Caution]:
+    if not known:
+        return [
+            Caution(
+                "no-markers",
+                "No marker of the library was seen by either camera.",
+                "Check the library (--markers), and that prints are sharp, lit and face the cameras.",
+            )
+        ]
+    lost = [str(i) for i in known if i not in seen]
+    if not lost:
+        return []
+    return [
+        Caution(
+            "markers-not-in-both",
+            f"Not seen by both cameras most of the time: marker {', '.join(lost)}.",
+            "Turn markers or cameras so that both see them, and clear leaves away.",
+        )
+    ]
