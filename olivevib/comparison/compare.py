@@ -11,6 +11,7 @@ from olivevib.comparison.fit import ClockFit, Seen, fit_clock
 from olivevib.comparison.forward import Nuisance, SensorMotion, nuisance, sensor_motion
 from olivevib.comparison.lag import CoarseLag, envelope_offset, fine_lag, offsets_that_overlap
 from olivevib.comparison.lines import line_differences, sensor_lines, steady_limits
+from olivevib.comparison.noise import with_local_noise
 from olivevib.comparison.settings import DEFAULTS, ComparisonSettings
 from olivevib.comparison.types import Comparison, LineDifference, Verdict
 from olivevib.geometry import vector_from_rotation
@@ -67,6 +68,8 @@ def compare(
     seen, clock = work.refined(lag.offset_s)
     if seen.t_s.size < _FEWEST:
         return empty.undecided("Too few frames lie inside the accelerometer's record.")
+    if lines.fit is not None:
+        clock = with_local_noise(seen, clock, float(lines.fit.f_hz[0]))
     return _comparison(empty, work, lag, seen, clock, work.differences(sensor, clock))
 
 

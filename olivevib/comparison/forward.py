@@ -21,7 +21,8 @@ from olivevib.vibration.sway import sway_columns
 
 _DENSE_HZ = 1000.0  # the spline's own rate: 40 samples in a cycle of 25 Hz
 _GAP_PERIODS, _GAP_S = 2.5, 0.006  # a step longer than both is a gap: no spline bridges it
-_GAP_FADES = 3.0  # corner periods after which what a bridged gap upsets has died away
+_BELOW = 2 / 3
+_GAP_FADES = 2.0  # corner periods after which a bridged gap upsets no more than slow motion
 _MOST_SLOW = 0.6  # of the frames that the slow part may take
 _EVEN_PERIODS = 0.02
 
@@ -77,6 +78,7 @@ def sensor_motion(sensor: Samples, corner_hz: float) -> SensorMotion:
     even_t, even_a, resampled = even_acceleration(t_s, a)
     rate = 1.0 / float(even_t[1] - even_t[0])
     finer = max(1, int(np.ceil(_DENSE_HZ / rate)))
+    corner_hz *= _BELOW  # its own loss must be gone where the slow part ends (1.5 corners)
     displacement = to_displacement(even_a, rate, corner_hz, finer)
     fine_t = even_t[0] + np.arange(displacement.shape[0]) / (rate * finer)
     spline = CubicSpline(fine_t, displacement)

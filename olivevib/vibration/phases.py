@@ -10,7 +10,7 @@ import numpy as np
 from olivevib.arrays import Bools, Floats
 from olivevib.signals import Samples, fit_stamps
 from olivevib.vibration.clock import measured
-from olivevib.vibration.ridge import Ridge, camera_ridge, sensor_ridge, sensor_rms
+from olivevib.vibration.ridge import Ridge, camera_ridge, camera_rms, sensor_ridge, sensor_rms
 
 NAMES = ("rest", "start-up", "steady", "shut-down", "decay")
 WHOLE = "whole"
@@ -98,7 +98,7 @@ def find_phases(
         return ()
     limits = min(float(s.t_s[0]) for s in parts), max(float(s.t_s[-1]) for s in parts)
     ridge = camera_ridge(parts, sway_hz, _CAMERA_WINDOW_S, _CAMERA_HOP_S)
-    short = camera_ridge(parts, sway_hz, _ONSET_WINDOW_S, _CAMERA_HOP_S / 2)
+    short = camera_rms(parts, sway_hz, _ONSET_WINDOW_S, _CAMERA_HOP_S / 2)
     if ridge.t_s.size < 3:
         return (Phase("steady", *limits),) if limits[1] > limits[0] else ()
     return _phases(short, ridge, limits, _CAMERA_TRACK, settings)

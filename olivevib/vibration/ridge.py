@@ -49,16 +49,45 @@ def camera_ridge(
     Sway is taken out over the whole record; each window is scanned by least squares from sway_hz
     to half the rate, so gaps do no harm. A line above half the rate shows where it folds.
     """
-    parts = [measured(samples) for samples in motion]
-    parts = [(t, _without_sway(t, x, sway_hz)) for t, x in parts if t.size >= _FEWEST]
+    parts = _moving(motion, sway_hz)
     if not parts:
         return _empty(window_s)
-    start, end = min(t[0] for t, _ in parts), max(t[-1] for t, _ in parts)
     top = max(clock_of(t).rate_hz for t, _ in parts) / 2
-    times = np.arange(start + window_s / 2, end - window_s / 2 + 1e-9, hop_s)
+    times = _middles(parts, window_s, hop_s)
     rows = [_camera_window(parts, float(at), window_s, sway_hz, top) for at in times]
     columns = np.array(rows).reshape(-1, 3)
     return Ridge(times, columns[:, 0], columns[:, 1], columns[:, 2], window_s)
+
+
+def camera_rms(motion: Sequence[Samples], sway_hz: float, window_s: float, hop_s: float) -> Ridge:
+    """Rolling RMS of the markers' displacement, the sway taken out; no frequencies."""
+    parts = _moving(motion, sway_hz)
+    if not parts:
+        return _empty(window_s)
+    times = _middles(parts, window_s, hop_s)
+    total, count = np.zeros(times.size), np.zeros(times.size)
+    for t_s, values in parts:
+        sums = np.concatenate([[0.0], np.cumsum(np.sum(values**2, axis=1))])
+        first = np.searchsorted(t_s, times - window_s / 2)
+        last = np.searchsorted(t_s, times + window_s / 2)
+        enough = last - first >= _FEWEST
+        power = (sums[last] - sums[first]) / np.maximum(1, last - first)
+        total += np.where(enough, power, 0.0)
+        count += enough
+    unknown = np.full(times.size, np.nan)
+    rms = np.where(count > 0, np.sqrt(total / np.maximum(count, 1)), np.nan)
+    return Ridge(times, unknown, rms, unknown, window_s)
+
+
+def _moving(motion: Sequence[Samples], sway_hz: float) -> list[tuple[Floats, Floats]]:
+    """Times and motion without sway of the markers that were seen often enough."""
+    parts = [measured(samples) for samples in motion]
+    return [(t, _without_sway(t, x, sway_hz)) for t, x in parts if t.size >= _FEWEST]
+
+
+def _middles(parts: list[tuple[Floats, Floats]], window_s: float, hop_s: float) -> Floats:
+    start, end = min(t[0] for t, _ in parts), max(t[-1] for t, _ in parts)
+    return np.asarray(np.arange(start + window_s / 2, end - window_s / 2 + 1e-9, hop_s))
 
 
 def _empty(window_s: float) -> Ridge:

@@ -145,10 +145,14 @@ class Logger:
 
 
 def sensor(t, path, rng, logger, turn):
-    """What the logger writes: acceleration in sensor axes (turn carries them to the camera's)."""
-    pace = t[1] - t[0]
-    a = CubicSpline(t, path)(t, 2) * 1e-3
+    """What the logger writes: acceleration in sensor axes (turn carries them to the camera's).
+
+    Each sample is the mean over its period (a change of velocity): impacts keep their impulse.
+    """
     stamp = t + logger.offset_s + logger.drift * (t - logger.t_mid_s)
-    times = np.arange(stamp[0] + 10 * pace, stamp[-1] - 10 * pace, 1 / logger.rate_hz)
-    values = CubicSpline(stamp, a)(times) @ turn + np.array(logger.bias)
+    speed = CubicSpline(stamp, path).derivative()
+    period = 1 / logger.rate_hz
+    times = np.arange(stamp[0] + period, stamp[-1] - period, period)
+    mean = (speed(times + period / 2) - speed(times - period / 2)) / period * 1e-3
+    values = mean @ turn + np.array(logger.bias)
     return acceleration(times, values + logger.noise_m_s2 * rng.normal(size=values.shape))
