@@ -50,13 +50,14 @@ class Warp:
         places = board_mm[:, None] + reach_mm[:, None, None] * around
         px = self.forward(places.reshape(-1, 2)).reshape(len(board_mm), -1, 2)
         off = px - self.forward(board_mm)[:, None]
-        scale = np.abs(off).max(axis=(1, 2))
+        scale = np.maximum(np.abs(off).max(axis=(1, 2)), 1e-9)
         terms = _monomials(off[:, :, 0] / scale[:, None], off[:, :, 1] / scale[:, None])
-        normal = terms.transpose(0, 2, 1) @ terms
+        normal = terms.transpose(0, 2, 1) @ terms + RIDGE * np.eye(len(CUBIC))
         back = np.linalg.solve(normal, terms.transpose(0, 2, 1) @ places)
         return [LocalInverse(b, float(s)) for b, s in zip(back, scale, strict=True)]
 
 
+RIDGE = 1e-9  # of 49: a board seen edge-on by a wrong reading has no way back, but no crash either
 CUBIC = tuple((i, j) for i in range(4) for j in range(4 - i))
 
 
@@ -86,6 +87,13 @@ class LocalInverse:
             if j:
                 slope[CUBIC.index((i, j - 1)), [1, 3]] += j * c[k]
         return terms @ c, terms @ slope / self.scale_px
+
+
+def sane(warp: Warp, board_mm: Floats) -> bool:
+    """Whether the warp neither folds nor flips anywhere near the points (N, 2)."""
+    det = np.linalg.det(warp.jacobian(board_mm))
+    size = np.abs(det)
+    return bool(np.isfinite(det).all() and (np.sign(det) == np.sign(det[0])).all() and size.min() > 1e-3 * size.max())
 
 
 def straight(H: Floats) -> Warp:
