@@ -147,7 +147,7 @@ DEMO = Scenario(
 
 SAMPLE = Scenario(
     "sample",
-    "six ArUco markers on a shaken tree, 11.3 Hz, cameras in step, global shutter, 3 s, small files",
+    "six ArUco markers on a shaken tree, 11.3 Hz, cameras in step, global shutter, 3 s, small",
     3.0,
     Shaking(11.3, Phases(0.4, 0.35, 2.55, 0.2), sway_mm=0.6, decay_mm=2.0),
     (5.0, 14.0),
