@@ -43,8 +43,8 @@ def at_times(track: Track, track_t_s: Floats, t_s: Floats) -> View:
     """The marker at the times ``t_s`` (N,), between this camera's observations at track_t_s.
 
     Cubic through four neighbours (one-sided at the ends), linear through two beside a gap, nothing
-    across one. A motion above half the frame rate is not followed by any interpolation: who calls must
-    know the band. Covariances are those of independent neighbours.
+    across one. A motion above half the frame rate is not followed by any interpolation: who calls
+    must know the band. Covariances are those of independent neighbours.
     """
     seen = np.flatnonzero(np.isfinite(track.centre_px[:, 0]))
     n = t_s.size

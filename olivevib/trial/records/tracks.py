@@ -27,7 +27,8 @@ class CameraRecord:
     """One camera's recording: how it was stamped and read out.
 
     stamp_kind: "container", "file" or "slots" (AVI: made up from the rate); method: how the clock
-    fit took the stamps ("line" or "stamps"); row_time_s signed per raw sensor row, row_time_source "unknown" when taken as zero.
+    fit took the stamps ("line" or "stamps"); row_time_s signed per raw sensor row, row_time_source
+    "unknown" when taken as zero.
     """
 
     video: str
