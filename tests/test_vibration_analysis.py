@@ -133,7 +133,8 @@ def test_printed_numbers_do_not_depend_on_window_segments_or_unit_of_time():
         for name in NAMES:
             for segments in (1, 3):
                 settings = VibrationSettings(window=name, segments=segments)
-                result = analyse({1: displacement(t, tone.at(t))}, facts, settings)
+                steady = (Phase("steady", t[0], t[-1]),)
+                result = analyse({1: displacement(t, tone.at(t))}, facts, settings, steady)
                 row, s = result.row(1), result.spectra["displacement"]
                 numbers = np.concatenate(
                     [
@@ -201,3 +202,14 @@ def test_twice_the_same_is_the_same_to_the_bit():
     for quantity in a.spectra:
         assert a.spectra[quantity].amplitude.tobytes() == b.spectra[quantity].amplitude.tobytes()
     assert repr(a.table) == repr(b.table)
+
+
+@pytest.mark.parametrize(
+    ("exposure_ms", "code"), [(2.0, None), (8.0, "exposure-blur"), (25.0, "exposure-too-long")]
+)
+def test_long_exposures_are_told(exposure_ms, code):
+    motion, _ = motion_of(SLOW, markers=1)
+    facts = SamplingFacts(
+        30.0, stamps_true=True, band_hz=(5.0, 14.0), exposure_s=1e-3 * exposure_ms
+    )
+    assert [c.code for c in analyse(motion, facts).cautions] == ([code] if code else [])

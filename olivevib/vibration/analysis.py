@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from olivevib.arrays import Floats
-from olivevib.errors import Caution
 from olivevib.progress import Tick, silent
 from olivevib.signals import Samples
+from olivevib.vibration.cautions import cautions
 from olivevib.vibration.clock import between, clock_of, measured
 from olivevib.vibration.figures import NO_LINE, Figures, LineFigures, figures, unknown
 from olivevib.vibration.kinematics import (
@@ -83,7 +83,7 @@ def analyse(
         spectra=_spectra(motion, shown, found, facts, settings),
         table=tuple(rows),
         spectrum_phase=shown.name,
-        cautions=cautions(rows, shown, facts),
+        cautions=cautions(rows, shown.name, facts),
     )
 
 
@@ -225,50 +225,3 @@ def _line_of(line: Line, derivative: int) -> Line:
         probabilities=line.probabilities,
         reasons=line.reasons,
     )
-
-
-# -- cautions -------------------------------------------------------------------------------------
-
-
-def cautions(
-    rows: Sequence[MarkerMotion], shown: Phase, facts: SamplingFacts
-) -> tuple[Caution, ...]:
-    """Quality warnings of the phase that is shown."""
-    out = []
-    statuses = {r.line.status for r in rows if r.phase == shown.name}
-    if statuses & {LineStatus.AMBIGUOUS, LineStatus.ALIASED}:
-        out.append(
-            Caution(
-                "frequency-undecided",
-                f"At {facts.frame_rate_hz:.2f} frames/s several frequencies in the band of "
-                f"{facts.band_hz[0]:g}-{facts.band_hz[1]:g} Hz look the same: no single "
-                "frequency, velocity or acceleration is given.",
-                f"Declare the band that the machine can reach (--band), or record above "
-                f"{2 * facts.band_hz[1]:.0f} frames/s.",
-            )
-        )
-    if LineStatus.BLIND in statuses:
-        out.append(
-            Caution(
-                "frequency-blind",
-                "A line lies where this frame rate cannot tell it from sway or from its mirror.",
-                "Change the machine's speed by 2 Hz or the cameras' frame rate.",
-            )
-        )
-    if LineStatus.CHIRP in statuses:
-        out.append(
-            Caution(
-                "frequency-chirp",
-                "The machine's speed changes too fast for one line to describe it.",
-                "Let the machine run at one speed for at least five seconds.",
-            )
-        )
-    if shown.name == WHOLE:
-        out.append(
-            Caution(
-                "no-steady-phase",
-                "No steady phase was found; the figures are of the whole record.",
-                "Look at the paths, and set the phases by hand if the machine did run steadily.",
-            )
-        )
-    return tuple(out)

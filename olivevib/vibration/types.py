@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 from math import nan
+from typing import Any
+
+import numpy as np
 
 from olivevib.arrays import Floats, Ints, floats, ints
 
@@ -93,3 +96,39 @@ class Spectrum:
         object.__setattr__(self, "psd", floats("psd", self.psd, shape, nan=True))
         if len(self.lines) != ids.size:
             raise ValueError(f"need one line a marker, got {len(self.lines)} for {ids.size}")
+
+    def to_dataframe(self) -> Any:
+        """One row a marker and frequency, markers in their order (pandas).
+
+        Columns f_hz, marker, x, y, z (peak amplitude in ``unit``), psd_x, psd_y, psd_z (unit²/Hz).
+        """
+        import pandas as pd
+
+        bins, markers = self.f_hz.size, self.ids.size
+        table = {"f_hz": np.tile(self.f_hz, markers), "marker": np.repeat(self.ids, bins)}
+        for name, values in (("", self.amplitude), ("psd_", self.psd)):
+            for k, axis in enumerate("xyz"):
+                table[f"{name}{axis}"] = values[:, :, k].T.ravel()
+        return pd.DataFrame(table)
+
+    def to_xarray(self) -> Any:
+        """Amplitude and density with named axes frequency, marker, axis (xarray.Dataset).
+
+        Units stand in the attributes; each marker has the status of its dominant line. Needs the
+        package xarray, which olivevib does not install.
+        """
+        import xarray as xr
+
+        fma = ("frequency", "marker", "axis")
+        data = {
+            "amplitude": (fma, self.amplitude, {"units": self.unit}),
+            "psd": (fma, self.psd, {"units": f"({self.unit})2/Hz"}),
+            "line_frequency": ("marker", [line.f_hz for line in self.lines], {"units": "Hz"}),
+            "line_status": ("marker", np.array([str(line.status) for line in self.lines], "U")),
+        }
+        coords = {
+            "frequency": ("frequency", self.f_hz, {"units": "Hz"}),
+            **{"marker": self.ids, "axis": ["x", "y", "z"]},
+        }
+        facts = {"quantity": self.quantity, "window": self.window, "phase": self.phase}
+        return xr.Dataset(data, coords, facts)

@@ -257,7 +257,7 @@ def c1_comparison(trials: int) -> list[Row]:
         ("25 Hz, 0.5 mm", {"amplitude_mm": 0.5}, 30.0, 0.06),
         ("25 Hz, straight", {"minor": 0.0}, 30.0, 0.06),
     ):
-        rows.append(_comparison(case, Shaker(**changes), fps, noise, max(8, trials // 12)))
+        rows.append(_comparison(case, Shaker(**changes), fps, noise, max(2, trials // 12)))
     return rows
 
 
