@@ -242,13 +242,14 @@ class _Rival:
 def _rival(work: _Work, lag: CoarseLag, clock: ClockFit) -> _Rival:
     if not np.isfinite(lag.rival_s) or lag.peak - lag.second_peak >= _CLOSE:
         return _Rival(False, True, 0.0, 0.0)
-    seen, other = work.refined(lag.rival_s)
+    _, other = work.refined(lag.rival_s)
     distance = abs(lag.rival_s - lag.offset_s)
     noise = np.maximum(clock.noise_mm, 1e-12)
     excluded = False
-    if np.isfinite(other.gain) and seen.t_s.size == clock.residual_mm.shape[0]:
-        now, then = (np.sum((c.residual_mm / noise) ** 2) for c in (clock, other))
-        excluded = bool(then - now > _DECISIVE)
+    if np.isfinite(other.gain):  # the two may share all frames but a few at the ends
+        now, then = (np.mean((c.residual_mm / noise) ** 2) for c in (clock, other))
+        frames = min(len(clock.residual_mm), len(other.residual_mm))
+        excluded = bool(3 * frames * (then - now) > _DECISIVE)
         distance = abs(other.offset_s - clock.offset_s)
     return _Rival(True, excluded, distance, np.nan if lag.level else max(distance, lag.scatter_s))
 
