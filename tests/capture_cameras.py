@@ -56,7 +56,7 @@ class Plan:
 class MjpegServer:
     """Serves one client after another; frame n is due n / fps after the client came."""
 
-    def __init__(self, plan: Plan | None = None):
+    def __init__(self, plan: Plan | None = None, port: int = 0):
         self.plan = plan or Plan()
         self._pictures = self.plan.pictures or [
             self.plan.picture or jpeg(self.plan.size, seed=k) for k in range(4)
@@ -64,7 +64,7 @@ class MjpegServer:
         self.sent: list[tuple[int, int]] = []  # number, checksum
         self.pause = threading.Event()
         self._stop = threading.Event()
-        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._listener = socket.create_server(("127.0.0.1", port))
         self._listener.settimeout(0.1)
         self._client: socket.socket | None = None
         self._thread = threading.Thread(target=self._serve, daemon=True)

@@ -67,7 +67,8 @@ def check(arguments: argparse.Namespace, console: Console) -> int:
     findings = pipeline.check(find_trial(arguments.trial, Path()), console.tick)
     for finding in findings:
         _out(f"{finding.state:8} {finding.what}  {finding.words}".rstrip())
-    return 1 if any(f.state == "lost" for f in findings) else 0
+    states = {finding.state for finding in findings}
+    return 1 if "lost" in states else 3 if "damaged" in states else 0
 
 
 def _out(text: Any) -> None:

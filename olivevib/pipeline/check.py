@@ -67,7 +67,7 @@ def _recording(path: Path, name: str, side: str, tick: Tick) -> Finding:
 
 
 def _checksums(path: Path, name: str, tick: Tick) -> Iterator[Finding]:
-    """Every frame against the side-car that olivevib's recorder wrote beside it, where there is one."""
+    """Every frame against the side-car that olivevib's recorder wrote beside it, if it did."""
     if path.is_dir():
         return
     try:

@@ -224,7 +224,7 @@ def _marker_cautions(known: Sequence[int], seen: Sequence[int]) -> list[Caution]
             Caution(
                 "no-markers",
                 "No marker of the library was seen by either camera.",
-                "Check the library (--markers), and that prints are sharp, lit and face the cameras.",
+                "Check the library (--markers), and that prints are sharp, lit and in view.",
             )
         ]
     lost = [str(i) for i in known if i not in seen]
