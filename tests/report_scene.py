@@ -226,7 +226,11 @@ def calibration() -> CalibrationRecord:
         residuals_left=sides[0],
         residuals_right=sides[1],
         holdout_mm=np.column_stack([true, rng.normal(0, 0.35, 800)]),
-        facts={"views": 62, "bow_mm": -0.11},
+        facts={
+            "views": 62,
+            "bow_mm": [-0.11123, 0.2],
+            "halves": [{"name": "odd", "largest_z": 1.23456}, {"name": "even", "usable": True}],
+        },
         dropped_views=("view 12: blurred", "view 40: moved"),
     )
 

@@ -75,6 +75,8 @@ def test_settings_keys_become_words_with_units():
     assert label("acceleration_rms_m_s2") == ("acceleration rms", "m/s²")
     assert label("notes") == ("notes", "")
     assert said(" ".join(fact("clamp_height_mm", 760.0))) == "clamp height 760 mm"
+    nested = [{"name": "odd", "largest_z": 1.23456}, {"usable": True}]
+    assert fact("halves", nested, 4) == ("halves", "name odd, largest z 1.235; usable yes")
     assert fact("damage", "") == ("damage", "not known")
     assert fact("simulated", False) == ("simulated", "no")
     assert said(fact("lever_mm", [0.0, 1.5, -2.0])[1]) == "0, 1.5, -2 mm"

@@ -27,6 +27,7 @@ class Section:
     stage: str = ""
 
 
+LONG = 1500  # characters of a verdict or a reason
 MOST_DROPPED = 20  # dropped calibration views that are named
 MOST_PAIRS = 66  # distances listed as a table: 12 markers
 SECTIONS = (
@@ -74,7 +75,10 @@ def render_page(content: ReportContent, tick: Tick = silent) -> str:
         missing=[(s.title, _why(content, s)) for s in SECTIONS if s not in shown],
         plates=drawn,
         verdict=verdict(content),
-        cautions=[(clean(c.code, 60), clean(c.text), clean(c.remedy)) for c in content.cautions],
+        cautions=[
+            (clean(c.code, 60), clean(c.text, LONG), clean(c.remedy, LONG))
+            for c in content.cautions
+        ],
         heading=_heading(content),
         markers=tables.marker_rows(content),
         meanings=[(str(s), words) for s, words in MEANING.items() if s in statuses],
@@ -83,7 +87,8 @@ def render_page(content: ReportContent, tick: Tick = silent) -> str:
         rig=tables.rig_pairs(content),
         cameras=tables.camera_columns(content),
         dropped_views=_dropped(content),
-        calibration_verdict=clean(content.calibration.verdict) if content.calibration else "",
+        calibration_facts=tables.calibration_facts(content),
+        calibration_verdict=clean(content.calibration.verdict, LONG) if content.calibration else "",
         timing=tables.timing_pairs(content),
         clocks=tables.camera_clocks(content),
         phase_rows=tables.phase_rows(content),
@@ -93,7 +98,7 @@ def render_page(content: ReportContent, tick: Tick = silent) -> str:
         comparisons=[
             (
                 str(c.verdict),
-                clean(c.reason),
+                clean(c.reason, LONG),
                 tables.comparison_pairs(content, c),
                 tables.comparison_lines(c),
             )
@@ -141,7 +146,7 @@ def _reasons(content: ReportContent) -> list[tuple[str, str]]:
     found: dict[str, list[str]] = defaultdict(list)
     for marker_id, line in content.lines().items():
         for reason in line.reasons:
-            found[clean(reason).rstrip(".")].append(str(marker_id))
+            found[clean(reason, LONG).rstrip(".")].append(str(marker_id))
     every = len(content.lines())
     word = {1: "Marker"}
     return [

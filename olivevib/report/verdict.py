@@ -12,6 +12,10 @@ from olivevib.report.words import count, measure, number, percent, triple
 from olivevib.vibration.types import Line, LineStatus
 
 AXES = "x\u00a0/\u00a0y\u00a0/\u00a0z"
+_REASON = {
+    LineStatus.BLIND: "the line looks like slow sway at this frame rate",
+    LineStatus.CHIRP: "the speed changes too fast for a line",
+}
 _AGREEMENT = {
     Verdict.AGREES: "camera and accelerometer agree",
     Verdict.DIFFERS: "camera and accelerometer differ",
@@ -98,7 +102,7 @@ def _without_amplitude(content: ReportContent) -> str:
     most = max(dict.fromkeys(statuses), key=statuses.count)
     return (
         f"No amplitude can be given: at {statuses.count(most)} of {count(len(lines), 'marker')}"
-        f" the line is {most} ({MEANING[most]})."
+        f" {_REASON.get(most, MEANING[most])} ({most})."
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from olivevib.report.clean import clean
@@ -70,7 +70,7 @@ def measure(value: Any, unit: str = "", sigma: Any = None, digits: int = 4) -> s
         return number(value, digits) + tail
     decimals = decimals_of(sigma)
     if sigma < 1e-9 * abs(value):  # far below what a file keeps: an exact value
-        return number(value, 9).rstrip("0").rstrip(".") + tail
+        return f"{value:.6g}".replace("-", _MINUS) + tail
     both = f"{plain(value, decimals)} ± {plain(sigma, decimals)}".replace(" ", _GAP)
     return (f"({both})" if unit == "°" else both) + tail
 
@@ -111,18 +111,23 @@ def label(key: str) -> tuple[str, str]:
     return clean(key.replace("_", " "), 60), ""
 
 
-def fact(key: str, value: Any) -> tuple[str, str]:
-    """A settings key and value as label and text with unit."""
+def fact(key: str, value: Any, digits: int = 6) -> tuple[str, str]:
+    """A settings key and value as label and text with unit; tables inside as ``key value, …``."""
     words, unit = label(key)
+    tail = _GAP + unit if unit else ""
     if value is None or value in ("", [], {}, ()):
         return words, NOT_KNOWN
     if isinstance(value, bool):
         return words, "yes" if value else "no"
     if known(value):
-        return words, f"{value:.6g}".replace("-", _MINUS) + (_GAP + unit if unit else "")
+        return words, f"{value:.{digits}g}".replace("-", _MINUS) + tail
+    if isinstance(value, Mapping):
+        inner = (fact(str(k), v, digits) for k, v in value.items())
+        return words, clean(", ".join(f"{name} {text}" for name, text in inner))
     if isinstance(value, list | tuple):
-        text = ", ".join(f"{v:.6g}" if known(v) else clean(v) for v in value)
-        return words, clean(text) + (_GAP + unit if unit else "")
+        nested = any(isinstance(v, Mapping) for v in value)
+        parts = [fact("", v, digits)[1] for v in value]
+        return words, clean(("; " if nested else ", ").join(parts)) + tail
     return words, clean(value)
 
 

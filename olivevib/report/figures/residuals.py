@@ -74,7 +74,8 @@ def holdout(record: CalibrationRecord) -> str:
         left.set_title(f"{error.size} distances, rms {rms:.3f} mm (dashed)", loc="left")
         step = max(1, error.size // 2000)
         canvas.dots(right, true[::step], error[::step], 1.6, canvas.LEFT)
-        right.autoscale_view(scaley=False)
+        pad = 0.05 * float(np.ptp(true)) or 1.0
+        right.set_xlim(float(true.min()) - pad, float(true.max()) + pad)
         right.axhline(0, color=canvas.QUIET, lw=0.6)
         right.set(xlabel="true distance, mm", ylabel="error, mm", ylim=(-reach, reach))
         share = float(np.sqrt(np.mean((error / true) ** 2)))

@@ -55,8 +55,6 @@ def scene(rig: StereoRig, trajectory: Trajectory | None, names: Mapping[int, str
             if trajectory is not None:
                 _paths(ax, how, trajectory, names)
             _frame(ax, figure)
-            for side, _, place in _cameras(rig):
-                _name(ax, how, place, side)
         _triad(oblique, view)
         oblique.set_axis_off()
         oblique.set_title("seen from behind the cameras", loc="left")
@@ -103,6 +101,10 @@ def _frustum(
     ax.plot(axis[:, 0], axis[:, 1], color=colour, lw=0.5, ls=(0, (1, 3)))
     x, y = view.flat(centre[None])[0]
     ax.plot(x, y, "s", color=colour, ms=4.5, mew=0)
+    if view is not _FROM_ABOVE:
+        low, high = np.vstack([rim, [[x, y]]]).min(axis=0), np.vstack([rim, [[x, y]]]).max(axis=0)
+        ax.annotate(f"{side} camera", ((low[0] + high[0]) / 2, low[1]), (0, -8), color=colour,
+                    textcoords="offset points", ha="center", va="center", fontsize=7)  # fmt: skip
 
 
 def _frame(ax: Axes, figure: Figure) -> None:
@@ -113,18 +115,6 @@ def _frame(ax: Axes, figure: Figure) -> None:
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     ax.set_xlim(x - scale * width / 2, x + scale * width / 2)
     ax.set_ylim(y - scale * height / 2, y + scale * height / 2)
-
-
-def _name(ax: Axes, view: _View, place: tuple[Floats, Floats], camera: str) -> None:
-    """The name of a camera behind it, inside the drawing."""
-    R, centre = place
-    here, ahead = view.flat(np.array([centre, centre + R[:, 2]]))
-    back = (here - ahead) / max(float(np.linalg.norm(here - ahead)), 1e-9)
-    share = (here[0] - ax.get_xlim()[0]) / np.ptp(ax.get_xlim())
-    anchor = "left" if share < 0.2 else "right" if share > 0.8 else "center"
-    ax.annotate(f"{camera} camera", here, (6 * back[0], 12 * back[1] - 4), fontsize=7,
-                color=canvas.LEFT if camera == "left" else canvas.RIGHT,
-                textcoords="offset points", ha=anchor, va="center")  # fmt: skip
 
 
 def _paths(ax: Axes, view: _View, trajectory: Trajectory, names: Mapping[int, str]) -> None:
@@ -153,6 +143,13 @@ def _triad(ax: Axes, view: _View, at: tuple[float, float] = (0.9, 0.1)) -> None:
 def _plan(ax: Axes, rig: StereoRig) -> None:
     centre = -rig.R_right_left.T @ rig.t_right_left_mm
     ax.plot([0, centre[0]], [0, centre[2]], color=canvas.INK, lw=0.8, ls=(0, (1, 1.5)))
+    outward = 1 if centre[0] > 0 else -1
+    for name, (x, z), away, colour in (
+        ("left camera", (0.0, 0.0), -outward, canvas.LEFT),
+        ("right camera", (centre[0], centre[2]), outward, canvas.RIGHT),
+    ):
+        ax.annotate(name, (x, z), (5 * away, -6), textcoords="offset points", va="center",
+                    ha="left" if away > 0 else "right", fontsize=7, color=colour)  # fmt: skip
     ax.grid()
     ax.set(xlabel="x, mm", ylabel="z (away from the cameras), mm")
     words = f"baseline {rig.baseline_mm:.1f} mm (dotted), optical axes {rig.angle_deg:.1f}° apart"

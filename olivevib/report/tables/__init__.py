@@ -11,9 +11,16 @@ from olivevib.report.tables.markers import (
     state_rows,
 )
 from olivevib.report.tables.record import provenance_pairs, record_sections, stage_rows
-from olivevib.report.tables.rig import camera_clocks, camera_columns, rig_pairs, timing_pairs
+from olivevib.report.tables.rig import (
+    calibration_facts,
+    camera_clocks,
+    camera_columns,
+    rig_pairs,
+    timing_pairs,
+)
 
 __all__ = [
+    "calibration_facts",
     "camera_clocks",
     "camera_columns",
     "candidate_accelerations",

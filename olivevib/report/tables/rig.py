@@ -43,8 +43,13 @@ def rig_pairs(content: ReportContent) -> list[Pair]:
         ("board", clean(record.board, 80) or NOT_KNOWN),
         *pairs,
         ("right camera late by, in the calibration", seconds(lag, record.right_offset_sigma_s)),
-        *(fact(k, v) for k, v in record.facts.items()),
     ]
+
+
+def calibration_facts(content: ReportContent) -> list[Pair]:
+    """Further numbers that the calibration states of itself."""
+    record = content.calibration
+    return [] if record is None else [fact(k, v, 4) for k, v in record.facts.items()]
 
 
 def camera_columns(content: ReportContent) -> list[tuple[str, str, str]]:
