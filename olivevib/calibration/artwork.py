@@ -48,8 +48,8 @@ def draw_artwork(board: Board) -> Artwork:
     cells = (board.columns + 1) * (board.rows + 1)
     cell = int(min(CELL_PX, max(16, np.sqrt(MOST_PX / cells))))
     grey, corner = draw(board, cell)
-    print_ = (255 - grey if board.inverted else grey).astype(np.float32) / 255
-    layers = tuple(_layer(print_, float(blur)) for blur in BLURS)
+    ink = np.asarray(255 - grey if board.inverted else grey, dtype=np.float32) / np.float32(255)
+    layers = tuple(_layer(ink, float(blur)) for blur in BLURS)
     return Artwork(layers, cell / board.pitch_mm, corner, _reach(board))
 
 
@@ -74,7 +74,10 @@ def charuco_board(board: Board) -> cv2.aruco.CharucoBoard:
     """OpenCV's board of the same description."""
     lengths = board.lengths_mm
     made = cv2.aruco.CharucoBoard(
-        (board.columns, board.rows), lengths["square"], lengths["marker"], predefined(board.dictionary)
+        (board.columns, board.rows),
+        lengths["square"],
+        lengths["marker"],
+        predefined(board.dictionary),
     )
     made.setLegacyPattern(board.legacy)
     return made
@@ -83,9 +86,7 @@ def charuco_board(board: Board) -> cv2.aruco.CharucoBoard:
 def _arucogrid(board: Board, cell: int) -> tuple[NDArray[np.uint8], Floats]:
     side = round(cell * board.lengths_mm["size"] / board.pitch_mm)
     margin = cell - side
-    grey = np.full(
-        (board.rows * cell + margin, board.columns * cell + margin), 255, np.uint8
-    )
+    grey = np.full((board.rows * cell + margin, board.columns * cell + margin), 255, np.uint8)
     dictionary = predefined(board.dictionary)
     for k in range(markers_on(board.kind, board.columns, board.rows)):
         row, column = divmod(k, board.columns)

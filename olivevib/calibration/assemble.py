@@ -92,9 +92,7 @@ def _empty() -> tuple[Floats, Floats, Floats]:
     return np.zeros((0, 3)), np.zeros((0, 2)), np.zeros(0)
 
 
-def flatten(
-    side: Side, pick: Ints, chain: int, poses: Ints, shape: BoardShape
-) -> Observations:
+def flatten(side: Side, pick: Ints, chain: int, poses: Ints, shape: BoardShape) -> Observations:
     """Observations of the views ``pick`` of one camera, each in its own board pose, own instant."""
     views = [side.views[k] for k in pick]
     table = table_of(views)
@@ -128,12 +126,16 @@ def _observations(
 
 def join(parts: Sequence[Observations]) -> Observations:
     """One set of observations, sorted by chain."""
-    names = ("chain", "pose", "ids", "board_mm", "track", "row", "sigma_px")
-    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    order = np.argsort(arrays["chain"], kind="stable")
+    order = np.argsort(np.concatenate([part.chain for part in parts]), kind="stable")
     return replace(
         parts[0],
-        **{name: array[order] for name, array in arrays.items()},
+        chain=np.concatenate([part.chain for part in parts])[order],
+        pose=np.concatenate([part.pose for part in parts])[order],
+        ids=np.concatenate([part.ids for part in parts])[order],
+        board_mm=np.concatenate([part.board_mm for part in parts])[order],
+        track=np.concatenate([part.track for part in parts])[order],
+        row=np.concatenate([part.row for part in parts])[order],
+        sigma_px=np.concatenate([part.sigma_px for part in parts])[order],
         row_time_s=np.sum([part.row_time_s for part in parts[:2]], axis=0),
         poses=max(part.poses for part in parts),
     )
@@ -167,14 +169,18 @@ def assemble(left: Side, right: Side, shape: BoardShape, lag_s: Floats) -> Assem
     return Assembly(join([own_left, matched, own_right]), np.arange(n), right_pose)
 
 
-def _by_frame(left: Side, right: Side, shape: BoardShape, lag_s: Floats) -> tuple[Observations, Ints]:
+def _by_frame(
+    left: Side, right: Side, shape: BoardShape, lag_s: Floats
+) -> tuple[Observations, Ints]:
     pairs = np.array(pair_views(left.views, right.views), dtype=np.int64).reshape(-1, 2)
     met = np.full(len(right.views), -1, dtype=np.int64)
     met[pairs[:, 1]] = pairs[:, 0]
     return flatten(right, pairs[:, 1], RIGHT, pairs[:, 0], shape), met
 
 
-def _tracked(left: Side, right: Side, shape: BoardShape, lag_s: Floats) -> tuple[Observations, Ints]:
+def _tracked(
+    left: Side, right: Side, shape: BoardShape, lag_s: Floats
+) -> tuple[Observations, Ints]:
     """Where the right camera saw each point at each left view's stamp plus the lag."""
     samples, stamps, n = right.samples(), times(left.views), len(left.views)
     points = table_of(right.views)

@@ -118,7 +118,7 @@ def _arucogrid_points(board: Board) -> Floats:
     centres = _grid(board.columns, board.rows, board.pitch_mm, size / 2)
     h = size / 2
     around = np.array([[0, 0, 0], [-h, -h, 0], [h, -h, 0], [h, h, 0], [-h, h, 0]])
-    return (centres[:, None] + around).reshape(-1, 3)
+    return np.asarray((centres[:, None] + around).reshape(-1, 3), dtype=np.float64)
 
 
 _POINTS = {
@@ -170,7 +170,9 @@ def board_from_table(table: Mapping[str, object]) -> Board:
     faults.
     """
     kind = str(table.get("kind", ""))
-    rest = {k: v for k, v in table.items() if k not in ("kind", "columns", "rows") and v is not False}
+    rest = {
+        k: v for k, v in table.items() if k not in ("kind", "columns", "rows") and v is not False
+    }
     if kind not in LENGTHS:
         return parse_board(kind + ":")  # tells the known kinds
     counts = f"{table.get('columns', '?')}x{table.get('rows', '?')}"

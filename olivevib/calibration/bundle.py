@@ -68,9 +68,9 @@ class Observations:
     """All image points of the problem, sorted by chain (LEFT, RIGHT, RIGHT_ALONE).
 
     chain (N,), pose (N,) index of the board pose, ids (N,) of the points, board_mm (N, 3);
-    track (N, m, 2): the image point as a polynomial in time, px/s^k (stills: only the first row); for
-    RIGHT in the lag, else about the view's own instant; row (N,): sensor rows below the reference
-    row; row_time_s (2,): the row times with which the tracks were made; sigma_px (N,);
+    track (N, m, 2): the image point as a polynomial in time, px/s^k (stills: only the first row);
+    for RIGHT in the lag, else about the view's own instant; row (N,): sensor rows below the
+    reference row; row_time_s (2,): the row times with which the tracks were made; sigma_px (N,);
     centre_mm (2,) and half_mm scale the bow; poses: number of board poses, seen or not.
     """
 
@@ -89,7 +89,7 @@ class Observations:
     @property
     def camera(self) -> Ints:
         """0 left, 1 right, for every observation (N,)."""
-        return (self.chain != LEFT).astype(np.int64)
+        return np.asarray(self.chain != LEFT, dtype=np.int64)
 
     def px(self, state: State) -> tuple[Floats, Floats]:
         """Image points (N, 2) at lag and row times of the state, and their velocity (N, 2) px/s."""
@@ -145,9 +145,7 @@ def linearise(obs: Observations, state: State) -> Linear:
     for camera, column in enumerate(ROW_OF):
         theta[:, :, column] = velocity * np.where(obs.camera == camera, obs.row, 0.0)[:, None]
     theta[:, :, BOW] = (by_point @ R[:, :, 2:]) * terms[:, None, :]
-    by_pose = np.concatenate(
-        [-by_point @ skew(turned), by_point, -late[:, :, None]], axis=2
-    )
+    by_pose = np.concatenate([-by_point @ skew(turned), by_point, -late[:, :, None]], axis=2)
     return Linear(predicted - observed, by_pose, theta)
 
 
@@ -166,7 +164,7 @@ def _through(chain: int, X: Floats, state: State, theta: Floats) -> tuple[Floats
 
 
 def huber_weights(residual: Floats, sigma_px: Floats, bound: float) -> Floats:
-    """Weights (N,) of points: 1 within ``bound`` sigma of the 2-D norm, falling as 1/norm beyond."""
+    """Weights (N,) of points: 1 within ``bound`` sigma (2-D norm), falling as 1/norm beyond."""
     norm = np.linalg.norm(residual, axis=1) / sigma_px
     return np.where(norm <= bound, 1.0, bound / np.maximum(norm, 1e-300))
 

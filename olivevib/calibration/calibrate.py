@@ -10,6 +10,7 @@ from olivevib.calibration.gather import gather, published_rig
 from olivevib.calibration.holdout import HoldOut, common_pairs, measure, with_tracks, without
 from olivevib.calibration.joint import Pair, fit_joint, fit_single, make_pair
 from olivevib.calibration.outliers import Cleaned, drop_outliers
+from olivevib.calibration.paper import paper_result
 from olivevib.calibration.quality import halves_test
 from olivevib.calibration.result import Calibration
 from olivevib.calibration.settings import CalibrationSettings
@@ -48,6 +49,22 @@ def calibrate(
     halves = halves_test(cleaned.fit)
     tick(3, 4, "judging")
     return gather(pair, cleaned, tested, halves)
+
+
+def calibrate_paper(
+    left: Sequence[BoardView],
+    right: Sequence[BoardView],
+    size_left: Size,
+    size_right: Size,
+    settings: CalibrationSettings | None = None,
+) -> Calibration:
+    """The paper's closed form for both cameras: no distortion, no lag, no covariance.
+
+    Raises InputError where no real camera explains the views, or too few views are common.
+    """
+    settings = settings or CalibrationSettings()
+    pair = make_pair_checked(left, right, (size_left, size_right), settings)
+    return paper_result(pair, settings.common_points)
 
 
 def fit_all(pair: Pair, settings: CalibrationSettings, tick: Tick = silent) -> Cleaned:
@@ -95,7 +112,9 @@ def _blank(size: Size, row_time_s: float, source: str) -> CameraModel:
     return CameraModel(size, K, np.zeros(5), row_time_s, row_time_source=source)
 
 
-def cross_validate(pair: Pair, settings: CalibrationSettings, tick: Tick = silent) -> HoldOut | None:
+def cross_validate(
+    pair: Pair, settings: CalibrationSettings, tick: Tick = silent
+) -> HoldOut | None:
     """Fit without the odd common frames, test on them; None where there are too few."""
     common = common_pairs(pair.left.views, pair.right.views, settings.common_points)
     if len(common) < LEAST_TEST_FRAMES:

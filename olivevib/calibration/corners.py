@@ -1,13 +1,15 @@
 """Board points to a few hundredths of a pixel: each patch of the print fitted to the image.
 
 A point is moved until the printed pattern around it, drawn through the board's homography (bent as
-the lens bends it) and blurred as the camera blurs, explains the grey values best
-(least squares with Tukey weights; gain and offset are planes over a patch). Markers within the patch help instead of pulling, as they do with cornerSubPix.
+the lens bends it) and blurred as the camera blurs, explains the grey values best: least squares
+with Tukey weights; gain and offset are planes over a patch. Markers within the patch help instead
+of pulling, as they do with cornerSubPix.
 Source: Lucas & Kanade, An iterative image registration technique, 1981; knowledge/detection 4.4.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,7 +18,7 @@ import numpy as np
 
 from olivevib.arrays import Bools, Floats, Grey, Ints
 from olivevib.calibration.artwork import Artwork, Image
-from olivevib.calibration.warp import Warp, bent_warp
+from olivevib.calibration.warp import Warp, bent_warp, sane
 
 BLURS_PX = (0.5, 0.9, 1.8)  # Gaussian blur of the camera, one is chosen a view
 MOST_PIXELS = 12_000  # of one view; larger patches are cut down, but not below the next
@@ -98,13 +100,15 @@ def _round(
     base = warp.forward(board_mm)
     lost = Fitted(start.px, np.full(n, np.nan), np.zeros(n, dtype=np.bool_))
     at = np.flatnonzero(_inside(warp, task, start.px - base))
-    if at.size == 0:
+    if at.size == 0 or not sane(warp, board_mm):
         return lost
     patches, full = _patches(task, warp, at, (start.px - base)[at])
     at = at[full]
     if at.size == 0:
         return lost
-    scale = artwork.px_per_mm * np.sqrt(abs(np.linalg.det(patches.by_px.mean(axis=0).reshape(2, 2))))
+    scale = artwork.px_per_mm * np.sqrt(
+        abs(np.linalg.det(patches.by_px.mean(axis=0).reshape(2, 2)))
+    )
     found = fit(artwork, patches, float(scale))
     px, sigma, ok = start.px.copy(), np.full(n, np.nan), np.zeros(n, dtype=np.bool_)
     ok[at] = found.good
@@ -158,7 +162,9 @@ def _joined(parts: list[tuple[Floats, Floats, Floats, Floats]]) -> _Patches:
     counts = [len(part[0]) for part in parts]
     if not parts:
         none = np.zeros(0, dtype=np.int64)
-        return _Patches(none, none, np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 4)))
+        return _Patches(
+            none, none, np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 4))
+        )
     start = np.cumsum([0, *counts[:-1]])
     return _Patches(
         start,
@@ -236,7 +242,7 @@ def _per_patch(patches: _Patches, columns: Floats, weight: Floats | None = None)
     other = columns if weight is None else columns * weight[:, None]
     ends = np.append(patches.start, patches.point.size)
     return np.array([
-        columns[a:b].T @ other[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True)
+        columns[a:b].T @ other[a:b] for a, b in itertools.pairwise(ends)
     ])  # fmt: skip
 
 
@@ -252,8 +258,8 @@ def _light(patches: _Patches, drawn: Floats) -> Floats:
     """The light (N, 6) of each patch by linear least squares."""
     columns = np.column_stack([_light_columns(patches, drawn), patches.grey])
     gram = _per_patch(patches, columns)
-    out: Floats = np.linalg.solve(_firm(gram[:, :6, :6]), gram[:, :6, 6:])[:, :, 0]
-    return out
+    light = np.linalg.solve(_firm(gram[:, :6, :6]), gram[:, :6, 6:])[:, :, 0]
+    return np.asarray(light, dtype=np.float64)
 
 
 def _left_over(patches: _Patches, drawn: Floats, light: Floats) -> Floats:
@@ -265,8 +271,7 @@ def _left_over(patches: _Patches, drawn: Floats, light: Floats) -> Floats:
 
 def _rms(patches: _Patches, residual: Floats) -> Floats:
     """Rms (N,) of each patch."""
-    out: Floats = np.sqrt(patches.sums((residual**2)[:, None])[:, 0] / patches.count)
-    return out
+    return np.asarray(np.sqrt(patches.sums((residual**2)[:, None])[:, 0] / patches.count))
 
 
 def _rest(artwork: Artwork, patches: _Patches, layer: Image, move: Floats) -> float:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from olivevib.arrays import Floats, Grey, Ints
 from olivevib.calibration.artwork import Artwork, charuco_board, draw_artwork
@@ -80,7 +82,9 @@ def refined(board: Board, artwork: Artwork, grey: Grey, raw: Raw) -> tuple[Ints,
     else:
         px_all, ids_all, found = px, ids, np.ones(ids.size, dtype=np.bool_)
     order = np.argsort(~found, kind="stable")
-    fit = refine(grey, artwork, plane[ids_all[order]], px_all[order], artwork.reach_mm[ids_all[order]])
+    fit = refine(
+        grey, artwork, plane[ids_all[order]], px_all[order], artwork.reach_mm[ids_all[order]]
+    )
     back = np.argsort(order)
     ok, at = fit.ok[back], fit.px[back]
     if ok[found].sum() < 0.5 * found.sum():
@@ -122,9 +126,12 @@ def _arucogrid_search(board: Board) -> Callable[[Grey], Raw | None]:
 
     def search(grey: Grey) -> Raw | None:
         corners, ids, _ = detector.detectMarkers(grey)
-        if ids is None:
+        if ids is None or len(ids) == 0:
             return None
-        once = {int(k): quad.reshape(4, 2) for k, quad in zip(ids.ravel(), corners, strict=True)}
+        once = {
+            int(k): np.asarray(quad.reshape(4, 2), dtype=np.float64)
+            for k, quad in zip(ids.ravel(), corners, strict=True)
+        }
         known = sorted(k for k in once if k < count)
         if not known:
             return None
@@ -179,12 +186,14 @@ _SEARCHES: dict[str, Callable[[Board], Callable[[Grey], Raw | None]]] = {
 }
 
 
-def _sorted(ids: Ints, px: Floats) -> Raw:
+def _sorted(ids: NDArray[Any], px: NDArray[Any]) -> Raw:
     order = np.argsort(ids)
     return ids[order].astype(np.int64), px[order].astype(np.float64)
 
 
-def _coded_view(board: Board, reader: Reader, grey: Grey, frame: int, t_s: float) -> BoardView | None:
+def _coded_view(
+    board: Board, reader: Reader, grey: Grey, frame: int, t_s: float
+) -> BoardView | None:
     """Markers of a coded board: the image of each centre, with the localiser's own sigma."""
     count = markers_on(board.kind, board.columns, board.rows)
     seen = {d.id - board.first: d for d in reader.detect(grey) if not d.flags}

@@ -86,7 +86,9 @@ class FrameTest:
     wanted: int
 
 
-def test_frame(rig: StereoRig, state: State, sides: tuple[Side, Side], pair: tuple[int, int]) -> FrameTest:
+def test_frame(
+    rig: StereoRig, state: State, sides: tuple[Side, Side], pair: tuple[int, int]
+) -> FrameTest:
     """Triangulate the common points of one frame, both images taken to the same instant."""
     left, right = (side.views[k] for side, k in zip(sides, pair, strict=True))
     if sides[1].timed:
@@ -102,7 +104,9 @@ def test_frame(rig: StereoRig, state: State, sides: tuple[Side, Side], pair: tup
     return FrameTest(left.frame, place[ok], a[ok], b[ok], xyz, miss, sigma, ids.size)
 
 
-def _at_instant(side: Side, view: BoardView, ids: Ints, later_s: float) -> tuple[Floats, Floats, Bools]:
+def _at_instant(
+    side: Side, view: BoardView, ids: Ints, later_s: float
+) -> tuple[Floats, Floats, Bools]:
     """Pixels (N, 2), sigmas (N,) of points of a view some time later, and which are sure."""
     at = np.searchsorted(view.ids, ids)
     px, sigma, ok = view.px[at], view.sigma_px[at], np.ones(ids.size, dtype=np.bool_)
@@ -115,7 +119,9 @@ def _at_instant(side: Side, view: BoardView, ids: Ints, later_s: float) -> tuple
     return px, sigma, (local.ok & (local.sigma_px < LARGEST_TRACK_PX)) | still
 
 
-def measure(rig: StereoRig, state: State, sides: tuple[Side, Side], test: Sequence[tuple[int, int]]) -> HoldOut | None:
+def measure(
+    rig: StereoRig, state: State, sides: tuple[Side, Side], test: Sequence[tuple[int, int]]
+) -> HoldOut | None:
     """All numbers of the test; None where fewer than two points could be compared anywhere."""
     frames = [test_frame(rig, state, sides, pair) for pair in test]
     wanted = sum(f.wanted for f in frames)
@@ -126,7 +132,9 @@ def measure(rig: StereoRig, state: State, sides: tuple[Side, Side], test: Sequen
     share, mm = (np.concatenate(e) for e in zip(*errors, strict=True))
     epipolar = np.concatenate([f.epipolar_px for f in frames])
     predicted = np.concatenate([predicted_sd(rig, f) for f in frames])
-    depth, again = zip(*(_rigid_errors(rig, f) for f in frames if len(f.board_mm) >= 3), strict=True)
+    depth, again = zip(
+        *(_rigid_errors(rig, f) for f in frames if len(f.board_mm) >= 3), strict=True
+    )
     return HoldOut(
         frames=len(frames),
         pairs=mm.size,
@@ -143,7 +151,9 @@ def measure(rig: StereoRig, state: State, sides: tuple[Side, Side], test: Sequen
         rms_z=_rms(mm / predicted),
         errors_percent=100 * share,
         errors_mm=mm,
-        frame=np.concatenate([np.full(len(e[0]), f.frame) for e, f in zip(errors, frames, strict=True)]),
+        frame=np.concatenate(
+            [np.full(len(e[0]), f.frame) for e, f in zip(errors, frames, strict=True)]
+        ),
     )
 
 
@@ -191,7 +201,9 @@ def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def with_tracks(sides: tuple[Side, Side], state: State, scales: tuple[float, float]) -> tuple[Side, Side]:
+def with_tracks(
+    sides: tuple[Side, Side], state: State, scales: tuple[float, float]
+) -> tuple[Side, Side]:
     """The sides as the fitted state sees them: its row times, its sigmas."""
     a, b = (
         replace(side.with_scale(scale), row_time_s=float(row_time))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from olivevib.arrays import Bools, Floats, Ints
+from olivevib.arrays import Bools, Floats
 from olivevib.calibration.assemble import Assembly, BoardShape, Side, assemble, shape_of, table_of
 from olivevib.calibration.bundle import BOW, LAG, LENS_OF, POSE, ROW_OF, THETA, State
 from olivevib.calibration.lag import LeftPoints, Pose, medoid_pose, search_lag
@@ -102,7 +102,9 @@ def fit_single(pair: Pair, settings: CalibrationSettings) -> tuple[LensFit, Lens
     known = (settings.known_left, settings.known_right)
     sds = row_time_sds(pair, settings)
     a, b = (
-        fit_lens(side, pair.shape, mono_prior(settings.lens, side, known[k], sds[k]), settings.huber)
+        fit_lens(
+            side, pair.shape, mono_prior(settings.lens, side, known[k], sds[k]), settings.huber
+        )
         for k, side in enumerate(pair.sides)
     )
     return a, b
@@ -201,7 +203,7 @@ def start_pose(
     while True:
         step = min(samples.period_s / 5, reach / 4)
         count = int(np.ceil(reach / step))
-        lags = step * np.arange(-count, count + 1)
+        lags = np.asarray(step * np.arange(-count, count + 1), dtype=np.float64)
         lag, found, rms = search_lag(points, samples, camera, pose, lags)
         if abs(lag) < reach - 1.5 * step or reach >= WIDEST_LAG_S:
             return found, lag, np.column_stack([lags, rms])

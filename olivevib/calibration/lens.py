@@ -21,7 +21,9 @@ START_VIEWS = 15  # views used to choose among the starts
 EFFICIENCY = 2 * (1 - np.exp(-2.0))  # E min(e^2, k^2) of a 2-D normal norm e at k = 2
 
 
-def lens_prior(prior: LensPrior, size_px: tuple[int, int], known: CameraModel | None) -> tuple[Floats, Floats]:
+def lens_prior(
+    prior: LensPrior, size_px: tuple[int, int], known: CameraModel | None
+) -> tuple[Floats, Floats]:
     """Mean (6,) and precision (6, 6) of one lens before any image."""
     width, height = size_px
     mean = np.array([0.0, 0.0, (width - 1) / 2, (height - 1) / 2, 0.0, 0.0])
@@ -32,7 +34,7 @@ def lens_prior(prior: LensPrior, size_px: tuple[int, int], known: CameraModel | 
     covariance = known.covariance.copy()
     widening = 0.005 * known.lens[:2]
     covariance[:2, :2] += np.outer(widening, widening)
-    return known.lens, np.linalg.inv(covariance)
+    return known.lens, np.asarray(np.linalg.inv(covariance), dtype=np.float64)
 
 
 def mono_prior(
@@ -166,8 +168,8 @@ def view_costs(obs: Observations, residual: Floats, bound: float = 2.0) -> Float
     """Robust cost of each board pose (V,)."""
     norm = np.linalg.norm(residual, axis=1) / obs.sigma_px
     each = np.where(norm <= bound, 0.5 * norm**2, bound * (norm - 0.5 * bound))
-    out: Floats = np.bincount(obs.pose, np.where(np.isfinite(each), each, np.inf), obs.poses)
-    return out
+    weights = np.where(np.isfinite(each), each, np.inf)
+    return np.asarray(np.bincount(obs.pose, weights, obs.poses), dtype=np.float64)
 
 
 def scale_of(problem: Problem, solution: Solution, at: Bools | None = None) -> float:

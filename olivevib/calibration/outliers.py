@@ -1,4 +1,4 @@
-"""Points and views that do not fit the rest: dropped with a reason, at most a fifth of the views."""
+"""Points and views that do not fit the rest: dropped with a reason, a fifth at most."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def drop_outliers(fit: JointFit, settings: CalibrationSettings) -> Cleaned:
         return Cleaned(fit, (), 0, False)
     problem = replace(fit.problem, observations=obs.only(keep))
     solution = solve(problem, fit.solution.state)
-    dropped = tuple(_told(fit, pose, norm) for pose in np.flatnonzero(bad_views))
+    dropped = tuple(_told(fit, int(pose), norm) for pose in np.flatnonzero(bad_views))
     again = replace(fit, problem=problem, solution=solution)
     return Cleaned(again, dropped, int(wild.sum()), too_many)
 

@@ -23,7 +23,7 @@ SIDES = ("left", "right")
 
 
 def halves_test(fit: JointFit) -> tuple[HalfTest, ...]:
-    """First against second half, and even against odd views: do they tell the same lens?"""
+    """First against second half, and even against odd views: whether they tell the same lens."""
     seen = np.unique(fit.problem.observations.pose)
     if seen.size < 12:
         return ()
@@ -154,8 +154,8 @@ def _focal(e: Evidence) -> Iterator[Caution]:
             flat = "always at the same distance" if cover.far_to_near < 1.5 else "too rarely tilted"
             yield Caution(
                 "focal-uncertain",
-                f"The focal length of the {side} camera is known to {percent:.1f} % only: the board "
-                f"was {flat}.",
+                f"The focal length of the {side} camera is known to {percent:.1f} % only: the "
+                f"board was {flat}.",
                 "Tilt the board by 30 to 45 degrees to all sides, near and far.",
             )
 

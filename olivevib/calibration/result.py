@@ -50,7 +50,12 @@ class Residuals:
         n = np.asarray(self.camera).size
         for name in ("camera", "frame", "id"):
             object.__setattr__(self, name, ints(name, getattr(self, name), (n,)))
-        for name, shape in (("px", (n, 2)), ("residual_px", (n, 2)), ("sigma_px", (n,)), ("weight", (n,))):
+        for name, shape in (
+            ("px", (n, 2)),
+            ("residual_px", (n, 2)),
+            ("sigma_px", (n,)),
+            ("weight", (n,)),
+        ):
             object.__setattr__(self, name, floats(name, getattr(self, name), shape))
 
 
@@ -97,7 +102,8 @@ class Calibration:
     rms_*_px: square root of the mean squared distance (OpenCV's convention) over the points used.
     bow_mm (3,): board height x^2, xy, y^2 at half its width. epipolar_rms_px: on unused frames
     where there are any, else on the fit. point_sigma_px: sigma of a board point in the left and the
-    right image, so that the distances on unused frames come out as predicted. method: "joint" or "paper".
+    right image, so that the distances on unused frames come out as predicted.
+    method: "joint" or "paper".
     """
 
     rig: StereoRig

@@ -22,7 +22,9 @@ def triangulate(rig: StereoRig, left_px: Floats, right_px: Floats) -> tuple[Floa
     for _ in range(3):
         residual, J = _residual(rig, points, observed)
         normal = J.transpose(0, 2, 1) @ J
-        backward = np.linalg.solve(normal + 1e-15 * np.eye(3), J.transpose(0, 2, 1))
+        backward = np.asarray(
+            np.linalg.solve(normal + 1e-15 * np.eye(3), J.transpose(0, 2, 1)), dtype=np.float64
+        )
         points = points - np.einsum("nij,nj->ni", backward, residual)
     residual, _ = _residual(rig, points, observed)
     return points, residual, backward

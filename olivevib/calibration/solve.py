@@ -126,8 +126,8 @@ def grams(problem: Problem, state: State) -> tuple[Floats, Floats]:
     slot = np.arange(pose.size) - np.repeat(np.cumsum(counts) - counts, counts)
     padded = np.zeros((obs.poses, int(counts.max(initial=0)), 2, rows.shape[2]))
     padded[pose, slot] = rows[order]
-    padded = padded.reshape(obs.poses, -1, rows.shape[2])
-    gram = padded.transpose(0, 2, 1) @ padded
+    flat = padded.reshape(obs.poses, -1, rows.shape[2])
+    gram = flat.transpose(0, 2, 1) @ flat
     gram[:, 6, 6] += problem.jitter_precision
     gram[:, 6, -1] += problem.jitter_precision * state.jitter_s
     return gram, linear.residual
@@ -137,27 +137,28 @@ def grams(problem: Problem, state: State) -> tuple[Floats, Floats]:
 class Reduced:
     """The system of the free THETA after the poses are eliminated.
 
-    H (V, p, p), g (V, p): information and gradient of each view; prior_H, prior_g the prior's;
-    pose (V, 7, p+1): what a view's pose does for a step of THETA (last column: its own step).
+    H (V, p, p), g (V, p): information and gradient of each view; prior_matrix (p, p) and
+    prior_gradient (p,) the prior's; pose (V, 7, p+1): what a view's pose does for a step of THETA
+    (last column: its own step).
     """
 
     H: Floats
     g: Floats
-    prior_H: Floats
-    prior_g: Floats
+    prior_matrix: Floats
+    prior_gradient: Floats
     pose: Floats
     pose_gradient: Floats
 
     @property
     def total_H(self) -> Floats:
         """Information of all views and the prior (p, p)."""
-        out: Floats = self.H.sum(axis=0) + self.prior_H
+        out: Floats = self.H.sum(axis=0) + self.prior_matrix
         return out
 
     @property
     def total_g(self) -> Floats:
         """Gradient of all views and the prior (p,)."""
-        out: Floats = self.g.sum(axis=0) + self.prior_g
+        out: Floats = self.g.sum(axis=0) + self.prior_gradient
         return out
 
 
@@ -172,7 +173,12 @@ def reduce(problem: Problem, state: State, gram: Floats, damping: float = 0.0) -
     _, gradient, matrix = problem.prior.at(state)
     free = problem.free
     return Reduced(
-        left[:, :, :-1], left[:, :, -1], matrix[np.ix_(free, free)], gradient[free], solved, W[:, :, -1]
+        left[:, :, :-1],
+        left[:, :, -1],
+        matrix[np.ix_(free, free)],
+        gradient[free],
+        solved,
+        W[:, :, -1],
     )
 
 

@@ -25,7 +25,7 @@ def thin(pair: Pair, most: int) -> Pair:
         np.union1d(pairs[keep, k], _alone(len(side.views), pairs[:, k], most // 2))
         for k, side in enumerate(pair.sides)
     )
-    return replace(pair, left=pair.left.only(left), right=pair.right.only(right))
+    return replace(pair, left=pair.left.only(left.tolist()), right=pair.right.only(right.tolist()))
 
 
 def _spread(speed: Floats, most: int) -> Ints:

@@ -15,6 +15,7 @@ LONGEST_GAP_PERIODS = 2.5
 ORDERS = (2, 4, 6)  # samples through which a track is drawn: as many as are near
 DISAGREEMENT = 0.3  # share of the difference to the next lower order taken as error
 
+
 @dataclass(frozen=True)
 class Samples:
     """All points of all views of one camera, sorted by point id, then time: rows of one table."""
@@ -81,7 +82,9 @@ def motion_at(samples: Samples, ids: Ints, t_s: Floats) -> Local:
     share = np.clip(before / np.maximum(before + after, 1e-12), 0, 1)
     outside = np.maximum(np.maximum(-before, -after), 0.0) / samples.period_s
     blind = np.linalg.norm(coefficients[:, 1], axis=1) * samples.period_s
-    error = np.where(usable > ORDERS[0], DISAGREEMENT * error, 0.1 * blind * (share * (1 - share) + outside))
+    error = np.where(
+        usable > ORDERS[0], DISAGREEMENT * error, 0.1 * blind * (share * (1 - share) + outside)
+    )
     sigma = samples.sigma_px[index]
     noise = np.hypot((1 - share) * sigma[:, middle], share * sigma[:, middle + 1])
     return Local(usable > 0, coefficients, np.hypot(noise, error))
@@ -106,7 +109,9 @@ def _stencil(samples: Samples, ids: Ints, t_s: Floats) -> tuple[Ints, Bools]:
     near = np.diff(t, axis=1) <= min(LONGEST_GAP_S, LONGEST_GAP_PERIODS * samples.period_s)
     outside = np.maximum(t[:, half - 1] - t_s, t_s - t[:, half])
     good = same.copy()
-    good[:, half - 1 : half + 1] &= (near[:, half - 1] & (outside <= 0.5 * samples.period_s))[:, None]
+    good[:, half - 1 : half + 1] &= (near[:, half - 1] & (outside <= 0.5 * samples.period_s))[
+        :, None
+    ]
     good[:, half - 1] &= same[:, half]
     good[:, half] &= same[:, half - 1]
     for k in range(half - 2, -1, -1):

@@ -7,8 +7,10 @@ Source: MacKinnon & White, Some heteroskedasticity-consistent covariance matrix 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from olivevib.arrays import Floats
 from olivevib.calibration.bundle import LAG, LENS_OF, STEREO, THETA
@@ -41,15 +43,15 @@ def uncertainty(problem: Problem, solution: Solution) -> Uncertainty:
     count = max(int(used.sum()), 2)
     lever = np.eye(len(model)) - H @ model
     pulls = np.linalg.solve(lever, g[:, :, None])[:, :, 0] * np.sqrt((count - 1) / count)
-    cluster = symmetric(model @ (pulls.T @ pulls + reduced.prior_H) @ model)
-    published = widen(model, pulls, reduced.prior_H)
+    cluster = symmetric(model @ (pulls.T @ pulls + reduced.prior_matrix) @ model)
+    published = widen(model, pulls, reduced.prior_matrix)
     pull = np.zeros(used.size)
     pull[used] = np.einsum("vi,ij,vj->v", g, model, g)
     full = [_full(problem, matrix) for matrix in (model, cluster, published)]
     return Uncertainty(full[0], full[1], full[2], pull)
 
 
-def widen(model: Floats, pulls: Floats, prior_H: Floats) -> Floats:
+def widen(model: Floats, pulls: Floats, prior_matrix: Floats) -> Floats:
     """The model covariance (p, p), widened wherever the views (V, p) scatter more than it says.
 
     In the frame in which the model is the unit matrix, the views' scatter is shrunk towards its
@@ -58,7 +60,7 @@ def widen(model: Floats, pulls: Floats, prior_H: Floats) -> Floats:
     """
     root = np.linalg.cholesky(model)
     x = np.sqrt(len(pulls)) * pulls @ root
-    own = root.T @ prior_H @ root
+    own = root.T @ prior_matrix @ root
     scatter = x.T @ x / len(x) + own
     mean, p = np.trace(scatter) / len(scatter), len(scatter)
     spread = float(((scatter - mean * np.eye(p)) ** 2).sum())
@@ -69,7 +71,7 @@ def widen(model: Floats, pulls: Floats, prior_H: Floats) -> Floats:
     return symmetric(root @ whitened @ root.T)
 
 
-def symmetric(matrix: Floats) -> Floats:
+def symmetric(matrix: NDArray[np.floating[Any]]) -> Floats:
     """The symmetric part, against rounding."""
     out: Floats = (matrix + matrix.T) / 2
     return out
@@ -122,7 +124,7 @@ class PointSigma:
 
 
 def rig_sensitivity(rig: StereoRig, xyz_mm: Floats) -> tuple[Floats, Floats]:
-    """d point / d RIG (N, 3, 18) and d point / d pixels (N, 3, 4) of points in the left frame."""
+    """Derivatives of points (left frame) by RIG (N, 3, 18) and by the four pixels (N, 3, 4)."""
     J = np.zeros((len(xyz_mm), 4, LAG))
     _, by_left, J[:, :2, LENS_OF[0]] = rig.left.project_jacobian(xyz_mm)
     turned = xyz_mm @ rig.R_right_left.T

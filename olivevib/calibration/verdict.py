@@ -18,7 +18,9 @@ def verdict(e: Evidence, rig: StereoRig, sigma_px: tuple[float, float]) -> str:
     if e.fit.lag_free:
         sd = 1e3 * float(np.sqrt(e.sure.published[LAG, LAG]))
         lag = 1e3 * e.fit.state.lag_s
-        parts.append(f"the right camera is {abs(lag):.1f} ± {sd:.1f} ms {'late' if lag > 0 else 'early'}")
+        parts.append(
+            f"the right camera is {abs(lag):.1f} ± {sd:.1f} ms {'late' if lag > 0 else 'early'}"
+        )
     parts.append(f"weakest: {weak_spot(e)}")
     text = "; ".join(part for part in parts if part)
     return text[0].upper() + text[1:] + "."
@@ -43,8 +45,8 @@ def _expected(rig: StereoRig, distance_mm: float, sigma_px: tuple[float, float])
     length = float(length_sigma(rig, at - half, at + half)[0])
     frame = " / ".join(f"{v:.2f}" for v in sigma.frame_mm[0])
     return (
-        f"at {distance_mm / 1000:.1f} m a length of 200 mm is right to {length:.2f} mm, and a board "
-        f"point scatters by {frame} mm in x / y / z from frame to frame"
+        f"at {distance_mm / 1000:.1f} m a length of 200 mm is right to {length:.2f} mm, and a "
+        f"board point scatters by {frame} mm in x / y / z from frame to frame"
     )
 
 
@@ -53,7 +55,9 @@ def working_point(rig: StereoRig, distance_mm: float) -> Floats:
     axis = rig.R_right_left.T @ np.array([0.0, 0.0, 1.0]) + np.array([0.0, 0.0, 1.0])
     centre = -rig.R_right_left.T @ rig.t_right_left_mm / 2
     axis = axis / np.linalg.norm(axis)
-    along = np.sqrt(max(distance_mm**2 - centre @ centre + (centre @ axis) ** 2, 1.0)) - centre @ axis
+    along = (
+        np.sqrt(max(distance_mm**2 - centre @ centre + (centre @ axis) ** 2, 1.0)) - centre @ axis
+    )
     return np.asarray((centre + along * axis)[None], dtype=np.float64)
 
 
@@ -66,7 +70,9 @@ def weak_spot(e: Evidence) -> str:
     for camera, side in enumerate(SIDES):
         cover = e.coverage[camera]
         spots.append((cover.frontal - 0.3, f"the {side} camera saw too few tilted boards"))
-        spots.append((0.6 - cover.filled, f"no board in the {cover.emptiest()} of the {side} image"))
+        spots.append(
+            (0.6 - cover.filled, f"no board in the {cover.emptiest()} of the {side} image")
+        )
         spots.append((1.5 - cover.far_to_near, f"the {side} camera saw the board at one distance"))
         spots.append((focal_percent(e, camera) - 0.7, f"the focal length of the {side} camera"))
     return max(spots)[1]

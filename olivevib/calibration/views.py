@@ -71,9 +71,7 @@ def _by_stamp(t_left: Floats, t_right: Floats) -> list[tuple[int, int]]:
     gap = np.abs(t_left[:, None] - t_right[None, :])
     to_right, to_left = gap.argmin(axis=1), gap.argmin(axis=0)
     limit = 0.5 * min(frame_period_s(t_left), frame_period_s(t_right))
-    pairs = [
-        (k, int(m)) for k, m in enumerate(to_right) if to_left[m] == k and gap[k, m] <= limit
-    ]
+    pairs = [(k, int(m)) for k, m in enumerate(to_right) if to_left[m] == k and gap[k, m] <= limit]
     return sorted(pairs, key=lambda pair: t_left[pair[0]])
 
 

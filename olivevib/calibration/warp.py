@@ -38,10 +38,10 @@ class Warp:
         return out
 
     def jacobian(self, board_mm: Floats) -> Floats:
-        """d pixel / d board (N, 2, 2)."""
+        """Derivative of the pixel by the board point (N, 2, 2)."""
         _, slopes = self._terms(board_mm)
         bend = np.einsum("nti,tj->nji", slopes, self.bend)
-        return homography_jacobian(self.H, board_mm) + bend
+        return np.asarray(homography_jacobian(self.H, board_mm) + bend, dtype=np.float64)
 
     def local_inverse(self, board_mm: Floats, reach_mm: Floats) -> list[LocalInverse]:
         """For each point (N, 2) the way back from pixels near it, good within its reach (N,)."""
@@ -93,7 +93,11 @@ def sane(warp: Warp, board_mm: Floats) -> bool:
     """Whether the warp neither folds nor flips anywhere near the points (N, 2)."""
     det = np.linalg.det(warp.jacobian(board_mm))
     size = np.abs(det)
-    return bool(np.isfinite(det).all() and (np.sign(det) == np.sign(det[0])).all() and size.min() > 1e-3 * size.max())
+    return bool(
+        np.isfinite(det).all()
+        and (np.sign(det) == np.sign(det[0])).all()
+        and size.min() > 1e-3 * size.max()
+    )
 
 
 def straight(H: Floats) -> Warp:
@@ -118,7 +122,7 @@ def bent_warp(board_mm: Floats, px: Floats) -> Warp:
         bend = np.linalg.solve(A.T @ terms + 1e-3 * np.eye(count), A.T @ left)
         miss = np.linalg.norm(left - terms @ bend, axis=1)
         weight = 1 / (1 + (miss / max(2 * float(np.median(miss)), 0.05)) ** 2)
-    return Warp(H, bend, centre, scale)
+    return Warp(H, np.asarray(bend), centre, scale)
 
 
 def robust_homography(board_mm: Floats, px: Floats) -> Floats:
