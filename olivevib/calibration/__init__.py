@@ -1,12 +1,13 @@
 """Boards, closed form, joint refinement and quality of the stereo calibration."""
 
 from olivevib.calibration.boards import Board, board_from_table, parse_board
-from olivevib.calibration.calibrate import calibrate, calibrate_paper
-from olivevib.calibration.closed_form import ClosedForm, closed_form
+from olivevib.calibration.calibrate import calibrate
+from olivevib.calibration.closed_form import ClosedForm, solve_closed
 from olivevib.calibration.coverage import Coverage
 from olivevib.calibration.diagnosis import Diagnosis, diagnose
 from olivevib.calibration.finding import BoardFinder, find_board
 from olivevib.calibration.holdout import HoldOut
+from olivevib.calibration.paper import calibrate_paper
 from olivevib.calibration.result import (
     BoardPoses,
     Calibration,
@@ -38,10 +39,10 @@ __all__ = [
     "board_from_table",
     "calibrate",
     "calibrate_paper",
-    "closed_form",
     "diagnose",
     "find_board",
     "length_sigma",
     "parse_board",
     "point_sigma",
+    "solve_closed",
 ]

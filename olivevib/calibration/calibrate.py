@@ -10,7 +10,6 @@ from olivevib.calibration.gather import gather, published_rig
 from olivevib.calibration.holdout import HoldOut, common_pairs, measure, with_tracks, without
 from olivevib.calibration.joint import Pair, fit_joint, fit_single, make_pair
 from olivevib.calibration.outliers import Cleaned, drop_outliers
-from olivevib.calibration.paper import paper_result
 from olivevib.calibration.quality import halves_test
 from olivevib.calibration.result import Calibration
 from olivevib.calibration.settings import CalibrationSettings
@@ -49,22 +48,6 @@ def calibrate(
     halves = halves_test(cleaned.fit)
     tick(3, 4, "judging")
     return gather(pair, cleaned, tested, halves)
-
-
-def calibrate_paper(
-    left: Sequence[BoardView],
-    right: Sequence[BoardView],
-    size_left: Size,
-    size_right: Size,
-    settings: CalibrationSettings | None = None,
-) -> Calibration:
-    """The paper's closed form for both cameras: no distortion, no lag, no covariance.
-
-    Raises InputError where no real camera explains the views, or too few views are common.
-    """
-    settings = settings or CalibrationSettings()
-    pair = make_pair_checked(left, right, (size_left, size_right), settings)
-    return paper_result(pair, settings.common_points)
 
 
 def fit_all(pair: Pair, settings: CalibrationSettings, tick: Tick = silent) -> Cleaned:

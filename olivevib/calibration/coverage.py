@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from olivevib.arrays import Floats, Ints
+from olivevib.calibration.bundle import State
 from olivevib.calibration.views import BoardView
 
 CELLS = (8, 5)  # columns, rows of the image
@@ -56,11 +57,11 @@ class Coverage:
 def cover(
     views: Sequence[BoardView],
     size_px: tuple[int, int],
-    R: Floats,
-    t_mm: Floats,
+    state: State,
     centre_mm: Floats,
 ) -> Coverage:
-    """Coverage of one camera from its views and their board poses R (V, 3, 3), t_mm (V, 3)."""
+    """Coverage of one camera from its views and the board poses of ``state``, one a view."""
+    R, t_mm = state.R_pose, state.t_pose_mm
     px = np.concatenate([view.px for view in views])
     x = np.clip(px[:, 0] / size_px[0] * CELLS[0], 0, CELLS[0] - 1).astype(np.int64)
     y = np.clip(px[:, 1] / size_px[1] * CELLS[1], 0, CELLS[1] - 1).astype(np.int64)

@@ -120,11 +120,11 @@ def poses_of(fit: JointFit) -> BoardPoses:
 
 def coverage_of(fit: JointFit) -> tuple[Coverage, Coverage]:
     """What each camera covered, with the poses that it found alone."""
-    out = []
-    for side, lens in zip(fit.pair.sides, fit.lenses, strict=True):
-        state, centre = lens.solution.state, fit.pair.shape.centre_mm
-        out.append(cover(side.views, side.camera.size_px, state.R_pose, state.t_pose_mm, centre))
-    return out[0], out[1]
+    a, b = (
+        cover(side.views, side.camera.size_px, lens.solution.state, fit.pair.shape.centre_mm)
+        for side, lens in zip(fit.pair.sides, fit.lenses, strict=True)
+    )
+    return a, b
 
 
 def epipolar_of(fit: JointFit, rig: StereoRig) -> float:
