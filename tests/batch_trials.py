@@ -15,6 +15,13 @@ from olivevib.trial.fingerprints import PRIVATE
 
 ROOT = Path(__file__).resolve().parents[1]
 
+HEARS_CTRL_C = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from olivevib.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
 
 def one(folder: Path, frames: int = 12) -> Path:
     """A small trial that holds all it needs, its rig too."""
@@ -37,9 +44,9 @@ def season(folder: Path, trial: Path, count: int) -> list[Path]:
 
 
 def start(*arguments: object) -> subprocess.Popen:
-    """``olivevib batch`` as a process of its own."""
+    """``olivevib batch`` as a process of its own, which Ctrl-C reaches wherever the tests run."""
     return subprocess.Popen(
-        [sys.executable, "-m", "olivevib", "batch", *map(str, arguments)],
+        [sys.executable, "-c", HEARS_CTRL_C, "batch", *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

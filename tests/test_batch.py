@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import batch_trials
@@ -12,11 +14,12 @@ from olivevib import pipeline
 from olivevib.batch import TrialResult, find_trials, measure_on_cluster
 from olivevib.batch.cluster import check_address
 from olivevib.batch.content_hash import result_hash
+from olivevib.batch.find import FILE
 from olivevib.batch.outlook import Outlook
 from olivevib.batch.unit import measure
 from olivevib.errors import Caution, UsageError
 from olivevib.files.store import read_stage, write_stage
-from olivevib.trial import Trial
+from olivevib.trial import Trial, document
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +65,12 @@ def test_a_name_that_leads_to_no_trial_is_wrong_use(tmp_path):
     for name in ("empty", "never"):
         with pytest.raises(UsageError, match="is no trial and holds none"):
             find_trials([str(tmp_path / name)], tmp_path)
+
+
+def test_the_batch_itself_stays_light_its_workers_do_the_work():
+    assert FILE == document.FILE
+    code = "import sys, olivevib.batch, olivevib.cli.batch; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 # --- time left ----------------------------------------------------------------------------
@@ -123,7 +132,7 @@ def test_what_is_no_address_is_told(address):
 
 
 def test_without_distributed_the_remedy_is_named(tmp_path, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(UsageError, match="distributed") as caught:
         next(measure_on_cluster([tmp_path], "127.0.0.1:8786"))
     assert "olivevib[cluster]" in caught.value.remedy

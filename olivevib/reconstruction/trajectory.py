@@ -103,3 +103,30 @@ class Trajectory:
         words = np.array([s.word for s in State])
         frame["state"] = words[self.state[:, order].T.ravel()] if m else np.empty(0, "U1")
         return pd.DataFrame(frame)
+
+    def to_xarray(self) -> Any:
+        """The arrays with named axes time, marker, axis, as in trajectory.h5 (xarray.Dataset).
+
+        ``.sel(marker=3, axis="x")`` picks by name; units stand in the attributes. Needs the package
+        xarray, which olivevib does not install.
+        """
+        import xarray as xr
+
+        nm = ("time", "marker")
+        nma = (*nm, "axis")
+        data = {
+            "sample_time": (nm, self.sample_t_s, {"units": "s"}),
+            "xyz": (nma, self.xyz_mm, {"units": "mm"}),
+            "sigma_xyz": (nma, self.sigma_xyz_mm, {"units": "mm"}),
+            "covariance": ((*nma, "axis2"), self.covariance_mm2, {"units": "mm2"}),
+            "rotation": (nma, self.rotation_rad, {"units": "rad"}),
+            "sigma_rotation": (nma, self.sigma_rotation_rad, {"units": "rad"}),
+            "state": (nm, np.array([s.word for s in State])[self.state]),
+            "epipolar": (nm, self.epipolar_px, {"units": "px"}),
+        }
+        axes = ["x", "y", "z"]
+        coords = {
+            "time": ("time", self.t_s, {"units": "s"}),
+            **{"marker": self.ids, "axis": axes, "axis2": axes},
+        }
+        return xr.Dataset(data, coords, {"frame": self.frame, "method": self.method})
