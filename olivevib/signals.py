@@ -108,7 +108,7 @@ def fit_stamps(stamps_s: ArrayLike) -> StampFit:
     return StampFit(
         sequence=sequence,
         t_s=stamps if method == "stamps" else line,
-        dropped=np.setdiff1d(np.arange(sequence[-1] + 1), sequence),
+        dropped=_missing(sequence),
         rate_hz=1.0 / period,
         rate_sigma_hz=period_sigma / period**2,
         jitter_s=float(np.sqrt(np.mean(residual**2))),
@@ -124,6 +124,13 @@ _CHUNK, _MEMORY = 32, 96  # stamps counted at once; stamps behind that place the
 _AS_GOOD = 1.2  # scatter up to that much above the least: then fewer drops are believed
 _NO_BEAT = 0.1  # least scatter, in periods, from which one drop cannot be told from jitter
 _BLOCK, _BLOCKS = 24, 64  # stamps a block, and blocks, from which the period is read
+
+
+def _missing(sequence: Ints) -> Ints:
+    """The counts from the first to the last that no stamp has."""
+    empty = np.ones(int(sequence[-1]) + 1, dtype=np.bool_)
+    empty[sequence] = False
+    return np.flatnonzero(empty).astype(np.int64)
 
 
 def _sequence(stamps: Floats) -> Ints:

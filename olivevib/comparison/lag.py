@@ -117,7 +117,7 @@ def fine_lag(
     """
     worth = np.concatenate(
         [
-            turned_correlation(seen.mm, seen.slow.out(_seen(motion, seen, chunk)))
+            turned_correlation(seen, _seen(motion, seen, chunk))
             for chunk in np.array_split(offsets_s, max(1, offsets_s.size // _CHUNK))
         ]
     )
@@ -147,16 +147,21 @@ def _seen(motion: SensorMotion, seen: Seen, offsets_s: Floats) -> Floats:
     return np.asarray(np.where(inside[..., None], mm, 0.0))
 
 
-def turned_correlation(camera_mm: Floats, predicted_mm: Floats) -> Floats:
-    """(L,) largest correlation over all rotations of camera (N, 3) with predictions (L, N, 3).
+def turned_correlation(seen: Seen, predicted_mm: Floats) -> Floats:
+    """(L,) largest correlation over all rotations of what was seen with predictions (L, N, 3).
 
     With the singular values of the cross matrix s1 >= s2 >= s3: s1 + s2 +- s3, the sign of its
     determinant, over both sizes (Kabsch, Acta Cryst. A32 (1976) 922,
-    doi 10.1107/S0567739476001873).
+    doi 10.1107/S0567739476001873). The predictions' slow part counts for nothing: the camera's is
+    out already, so only their size must lose it.
     """
-    cross = np.einsum("nc,lnd->lcd", camera_mm, predicted_mm)
+    lags, n, _ = predicted_mm.shape
+    flat = predicted_mm.transpose(1, 0, 2).reshape(n, -1)
+    cross = (seen.mm.T @ flat).reshape(3, lags, 3).transpose(1, 0, 2)
+    slow = (seen.slow.columns.T @ flat).reshape(-1, lags, 3)
+    power = np.sum(predicted_mm**2, axis=(1, 2)) - np.sum(slow**2, axis=(0, 2))
     s = np.linalg.svd(cross, compute_uv=False)
     sign = np.where(np.linalg.det(cross) < 0, -1.0, 1.0)
-    size = np.sqrt(np.sum(camera_mm**2) * np.sum(predicted_mm**2, axis=(1, 2)))
+    size = np.sqrt(np.sum(seen.mm**2) * np.maximum(power, 0.0))
     total = s[:, 0] + s[:, 1] + sign * s[:, 2]
     return np.asarray(np.divide(total, size, out=np.zeros_like(total), where=size > 0))
