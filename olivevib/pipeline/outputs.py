@@ -29,11 +29,20 @@ def export(
 
 
 def report(trials: Sequence[Trial], folder: str | None, tick: Tick = silent) -> Iterator[Path]:
-    """Write one page a trial (report.html in its folder, or NAME.html in ``folder``)."""
-    from olivevib.report import write_trial_report
+    """Write one page a trial (report.html in its folder, or NAME.html in ``folder``).
 
+    Several trials also give a season page, season.html in ``folder`` or in the current folder.
+    """
+    from olivevib.report import write_season_report, write_trial_report
+
+    pages = []
     for trial in trials:
         page = Path(folder) / f"{trial.name}.html" if folder else trial.folder / "report.html"
         page.parent.mkdir(parents=True, exist_ok=True)
         write_trial_report(trial, page, tick)
+        pages.append(page)
         yield page
+    if len(trials) > 1:
+        season = Path(folder or ".") / "season.html"
+        write_season_report(list(zip(trials, pages, strict=True)), season, tick)
+        yield season
