@@ -8,10 +8,20 @@ import pytest
 from rendered_markers import Canvas, Look, cover, dapple, motion, pose, shadow_edge
 from test_detection_paper import LIBRARY, PLACES, places
 
+from olivevib.detection.card_fit import fit_card
 from olivevib.detection.noise import autocorrelation
-from olivevib.detection.template import Blur
+from olivevib.detection.refine import fitted_points
+from olivevib.detection.template import Blur, card
 from olivevib.detection.template_reader import TemplateReader
-from olivevib.marker import false_match_probability
+from olivevib.files.prints import marker_modules
+from olivevib.geometry import apply_homography, homography
+from olivevib.marker import (
+    MarkerLayout,
+    MarkerLibrary,
+    false_match_probability,
+    generate_library,
+    load_library,
+)
 
 
 def scene(seed: int, size: float = 48, look: Look | None = None):
@@ -125,6 +135,45 @@ def test_ellipses_hold_where_noise_is_correlated(spoilt):
     assert rms(errors) < 0.008
     assert (normalised < 5.99).mean() >= 0.83  # 20 of 24; 95 % expected
     assert np.mean(normalised) < 4
+
+
+def test_a_finer_layout_and_close_codes():
+    layout = MarkerLayout(modules=13, code=9, bar=9)
+    library = generate_library(28, mirrors=True, seed=2, layout=layout, budget=70_000)
+    canvas = Canvas(640, 480)
+    H = pose(13, 70, 35, 70, 120, (300, 200))
+    canvas.add(layout.pattern(library.codes[3]), H)
+    (d,) = TemplateReader(library).detect(canvas.grey())
+    assert d.id == library.ids[3]
+    assert np.abs(d.corners_px - apply_homography(H, layout.cornerstones)).max() < 0.05
+    codes = LIBRARY.codes[:2].copy()
+    codes[1] = codes[0]
+    codes[1, 3, 3] ^= True  # a library of distance 1: nothing may be corrected
+    close = MarkerLibrary("close", np.array([1, 2]), codes, LIBRARY.layout, 1)
+    for row in (0, 1):
+        canvas = Canvas(320, 240)
+        canvas.add(LIBRARY.layout.pattern(codes[row]), pose(11, 60, 20, 0, 30, (150, 120)))
+        assert [d.id for d in TemplateReader(close).detect(canvas.grey())] == [row + 1]
+
+
+def test_a_foreign_square_is_fitted_as_well():
+    """The template takes any pattern: an ArUco marker's centre to a few thousandths of a pixel."""
+    library = load_library("aruco:DICT_4X4_50")
+    errors = []
+    for k in range(6):
+        rng = np.random.default_rng(k)
+        canvas = Canvas(200, 200, Look(samples=16), rng=rng)
+        H = pose(6, 50, 30, rng.uniform(0, 360), rng.uniform(0, 360), (639.5, 359.5))
+        H = np.array([[1, 0, -540.2], [0, 1, -259.7], [0, 0, 1.0]]) @ H
+        dark = marker_modules(library, k)
+        canvas.add(dark, H / H[2, 2], quiet=1.5)
+        corners = apply_homography(H, library.layout.cornerstones) + rng.normal(0, 0.4, (4, 2))
+        start = homography(library.layout.cornerstones, corners)
+        one = fit_card(canvas.grey(), card(dark, 1), start, library.layout)
+        px, covariance = fitted_points(one.fit, np.zeros((1, 2)))
+        errors.append((px[0] - apply_homography(H, [[0, 0]])[0]) / np.sqrt(np.diag(covariance)))
+        assert np.sqrt(covariance[0, 0]) < 0.004
+    assert 0.4 < rms(np.array(errors)) < 1.7
 
 
 def test_autocorrelation_of_white_and_of_smoothed_noise():

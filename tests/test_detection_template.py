@@ -50,7 +50,12 @@ def test_the_drawing_agrees_with_the_renderer(size, tilt):
 
 
 @pytest.mark.parametrize(
-    ("size", "tilt", "limit"), [(24, 0, 0.0033), (48, 0, 0.002), (64, 60, 0.0022)]
+    ("size", "tilt", "limit"),
+    [
+        (24, 0, 0.0033),
+        pytest.param(48, 0, 0.002, marks=pytest.mark.slow),
+        pytest.param(64, 60, 0.0022, marks=pytest.mark.slow),
+    ],
 )
 def test_centres_reach_the_bound_and_their_ellipses_hold(size, tilt, limit):
     """Bounds of the knowledge page (noise 2): rmse within sampling error of 1.10 times."""

@@ -17,6 +17,7 @@ VARIANCES_PX2 = (0.15, 6.0)  # blur that is believed
 REDRAWN_PX2 = 0.12  # change of the blur that asks for a new drawing
 COARSE_PX = 15.0  # centre to corner for each pixel of stride in the first fit
 EVEN = 0.05  # rms over gain of a marker in even light, covered parts left out
+EVENED_NCC = 0.6  # correlation that a coarse fit must have once the light is even
 BETTER = 0.7  # of that rms: what evening out the light must achieve to be believed
 ROUNDS = 3  # of light and fit in turn
 UNEVEN_VARIANCE = 2.5  # covariance of fits in uneven light, times; set on rendered shadows
@@ -110,7 +111,7 @@ def _even(
     """Fit with the light divided out: as a closing shows it, then as the template shows it."""
     side, blur = module_px(H), Blur()
     coarse = draw_template(white, H, blur, layout.quiet, COARSE)
-    found = approach(coarse, closed_light(grey, pixels, side))
+    found = approach(coarse, closed_light(grey, pixels, side), EVENED_NCC)
     if found is None:
         return None
     H, blur = found[0], _rounder(blur, found[1])

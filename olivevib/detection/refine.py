@@ -136,10 +136,17 @@ class _Settled:
     converged: bool
 
 
-def approach(template: Template, pixels: Pixels) -> tuple[Floats, Floats] | None:
-    """A first, coarse fit: pose H (3, 3) and further variances (S,); None where it is lost."""
+def approach(
+    template: Template, pixels: Pixels, least_ncc: float = 0.3
+) -> tuple[Floats, Floats] | None:
+    """A first, coarse fit: pose H (3, 3) and further variances (S,); None where it is lost.
+
+    Lost is what correlates with the image on the whole marker by less than ``least_ncc``.
+    """
     end = _settle(template, pixels)
     if end is None:
+        return None
+    if _correlation(end.T, pixels.level) < least_ncc:
         return None
     H = _from_template(pixels, end.state.W) @ template.H
     return H / H[2, 2], end.state.further
@@ -324,3 +331,9 @@ def point_jacobian(fit: Fit, points: Floats) -> Floats:
     B[:, 1, 0], B[:, 1, 1] = W[1, 0] - Yt * W[2, 0], W[1, 1] - Yt * W[2, 1]
     out: Floats = np.asarray(-fit.scale * np.linalg.solve(B, Q), dtype=np.float64)
     return out
+
+
+def fitted_points(fit: Fit, points: Floats) -> tuple[Floats, Floats]:
+    """Images (N, 2), px, of centred module points (N, 2) and their covariance (2 N, 2 N), px²."""
+    J = point_jacobian(fit, points).reshape(2 * len(points), 8)
+    return apply_homography(fit.H, points), J @ fit.covariance @ J.T

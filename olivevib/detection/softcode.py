@@ -25,13 +25,15 @@ CHANNELS = 128  # readings that OpenCV takes side by side
 @dataclass(frozen=True)
 class SoftMatch:
     """The best code of each of N readings: row in the library, turn (np.rot90 back to the print),
-    Hamming distance, and score: mean agreement of the modules, 1 for a perfect one.
+    Hamming distance, score: mean agreement of the modules, 1 for a perfect one, and frame: share of
+    the bars' modules that are not dark and of the white ring's that are not white.
     """
 
     row: Ints
     turn: Ints
     wrong: Ints
     score: Floats
+    frame: Floats
 
 
 class SoftReader:
@@ -54,8 +56,7 @@ class SoftReader:
         v, u = np.meshgrid(at, at, indexing="ij")
         plane = np.column_stack([np.ones(n * n), u.ravel(), v.ravel()])
         self._planes = [
-            (np.linalg.pinv(plane[at]).T @ plane[self._area].T, at)
-            for at in (self._bars, self._white)
+            (np.linalg.pinv(plane[at]).T @ plane.T, at) for at in (self._bars, self._white)
         ]
 
     def match(self, grey: Grey, H: Floats) -> SoftMatch:
@@ -63,17 +64,18 @@ class SoftReader:
         levels = read_modules(grey, H, self._points)
         best: SoftMatch | None = None
         for dark, white in self._references(levels):
-            half = np.maximum((white - dark) / 2, 1.0)
-            clear = (levels[:, self._area] - (white + dark) / 2) / half
-            one = self._nearest(np.clip(clear, -LOUDEST, LOUDEST).astype(np.float32))
+            clear = (levels - (white + dark) / 2) / np.maximum((white - dark) / 2, 1.0)
+            area = np.clip(clear[:, self._area], -LOUDEST, LOUDEST).astype(np.float32)
+            wrong = (clear[:, self._bars] > 0).sum(axis=1) + (clear[:, self._white] < 0).sum(axis=1)
+            one = self._nearest(area, wrong / (len(self._bars) + len(self._white)))
             best = one if best is None else _better(best, one)
         assert best is not None
         return best
 
     def _references(self, levels: Floats) -> list[tuple[Floats, Floats]]:
-        """Dark and white level of each area module (N, c²) or (N, 1), in four ways."""
+        """Dark and white level of each module (N, n²) or (N, 1), in four ways."""
         bars, white = levels[:, self._bars], levels[:, self._white]
-        medians = tuple(np.median(x, axis=1, keepdims=True) for x in (bars, white))
+        medians = [np.median(x, axis=1, keepdims=True) for x in (bars, white)]
         planes = [levels[:, at] @ through for through, at in self._planes]
         area = levels[:, self._area]
         extremes = (area.min(axis=1, keepdims=True), area.max(axis=1, keepdims=True))
@@ -90,17 +92,18 @@ class SoftReader:
             for k in range(0, modules.shape[2], CHANNELS)
         ]
         closed = np.concatenate([np.atleast_3d(part) for part in parts], axis=2)
-        white = np.maximum(closed.transpose(2, 0, 1).reshape(len(levels), -1), 1.0)
+        white = np.maximum(closed.transpose(2, 0, 1).reshape(len(levels), -1), 1.0).astype(
+            np.float64
+        )
         share = np.median(levels[:, self._bars] / white[:, self._bars], axis=1, keepdims=True)
-        area = white[:, self._area].astype(np.float64)
-        return share * area, area
+        return share * white, white
 
-    def _nearest(self, clear: NDArray[np.float32]) -> SoftMatch:
+    def _nearest(self, clear: NDArray[np.float32], frame: Floats) -> SoftMatch:
         score = clear @ self._signs.T
         best = score.argmax(axis=1)
         top = np.take_along_axis(score, best[:, None], axis=1)[:, 0]
         wrong = ((clear > 0) != (self._signs[best] > 0)).sum(axis=1)
-        return SoftMatch(best // 4, best % 4, wrong, top.astype(np.float64) / self.side**2)
+        return SoftMatch(best // 4, best % 4, wrong, top.astype(np.float64) / self.side**2, frame)
 
 
 def _better(a: SoftMatch, b: SoftMatch) -> SoftMatch:
@@ -110,4 +113,5 @@ def _better(a: SoftMatch, b: SoftMatch) -> SoftMatch:
         np.where(take, b.turn, a.turn),
         np.where(take, b.wrong, a.wrong),
         np.where(take, b.score, a.score),
+        np.where(take, b.frame, a.frame),
     )

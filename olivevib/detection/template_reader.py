@@ -15,10 +15,7 @@ from olivevib.detection.candidates import dark_passes, fine_bars
 from olivevib.detection.card_fit import CardFit, fit_card
 from olivevib.detection.detection import Detection
 from olivevib.detection.hypotheses import Frames, frame_hypotheses, joined
-from olivevib.detection.refine import (
-    Fit,
-    point_jacobian,
-)
+from olivevib.detection.refine import Fit, fitted_points
 from olivevib.detection.settings import DetectionSettings
 from olivevib.detection.softcode import SoftMatch, SoftReader
 from olivevib.detection.template import card
@@ -26,6 +23,7 @@ from olivevib.geometry import apply_homography
 from olivevib.marker import MarkerLibrary
 
 TRIED_WRONG = (8, 12)  # of 49 modules that a hypothesis may have wrong: two bars, three or four
+FRAME_WRONG = 0.3  # share of the frame's modules that may look wrong (half do by chance)
 SURE = 0.92  # correlation on the whole marker; a wrong code reaches .81 (rendered, to 12 px blur)
 WRONG = (4, 6)  # after the fit: clear, and where a part is covered
 NCC = (0.75, 0.6)
@@ -33,7 +31,8 @@ RMS = (0.16, 0.2)  # of the gain
 COVERED = 0.9  # mean weight below which a part is covered
 CELL = 0.7  # weight of a ninth of the marker below which it is called occluded
 SMALLEST_PX2 = 60.0
-NEAR_PX = 4.0
+NEAR_SIZES = 0.25  # of a marker: no second one is looked for so close to one that was found
+FAR_CODES = 12 / 49  # distance of codes from which the whole drawing tells them apart
 
 
 @dataclass(frozen=True)
@@ -59,6 +58,9 @@ class TemplateReader:
         self._soft = SoftReader(library)
         mirrored = replace(library, codes=library.codes[:, :, ::-1])
         self._mirrored = SoftReader(mirrored)
+        bits, apart = library.layout.code**2, library.distance
+        self._wrong = [min(round(most * bits / 49), (apart - 1) // 2) for most in WRONG]
+        self._far = apart >= FAR_CODES * bits
         self._cards = [
             card(library.layout.pattern(code), library.layout.quiet) for code in library.codes
         ]
@@ -101,10 +103,11 @@ class TemplateReader:
             return []
         H = frames.homographies()
         match = self._soft.match(grey, H)
+        modules = self.library.layout.modules
         found: list[_Found] = []
         places = np.empty((0, 2))
         for k in _order(frames, match, self.library.layout.code):
-            near = max(3.0, 0.25 * 11 * float(np.linalg.norm(frames.a[k])))
+            near = max(3.0, NEAR_SIZES * modules * float(np.linalg.norm(frames.a[k])))
             if (((places - frames.centre[k]) ** 2).sum(axis=1) < near * near).any():
                 continue
             code = (int(match.row[k]), int(match.turn[k]), int(match.wrong[k]))
@@ -131,27 +134,24 @@ class TemplateReader:
         again = self._soft.match(grey, fit.H[None])
         wrong = int(again.wrong[0])
         read = int(again.row[0]) == row and int(again.turn[0]) == 0
-        clear = read and wrong <= WRONG[fit.weight < COVERED]
-        if not clear and fit.whole_ncc < SURE:
+        clear = read and wrong <= self._wrong[fit.weight < COVERED]
+        if not clear and not (self._far and fit.whole_ncc >= SURE):
             return None
         return _Found(row, fit.H, card_fit, wrong if read else first_wrong)
 
     def _detection(self, one: _Found) -> Detection:
-        stones = self.library.layout.cornerstones
-        points = np.vstack([np.zeros((1, 2)), stones])
-        px = apply_homography(one.H, points)
         fit = one.card.fit
-        J = point_jacobian(fit, points)
-        corners = J[1:].reshape(8, 8)
+        points = np.vstack([np.zeros((1, 2)), self.library.layout.cornerstones])
+        px, covariance = fitted_points(fit, points)
         flags = ["occluded"] if fit.cells.min() < CELL else []
         if one.card.uneven:
             flags.append("shadowed")
         return Detection(
             id=int(self.library.ids[one.row]),
             corners_px=px[1:],
-            corners_cov_px2=corners @ fit.covariance @ corners.T,
+            corners_cov_px2=covariance[2:, 2:],
             centre_px=px[0],
-            centre_cov_px2=J[0] @ fit.covariance @ J[0].T,
+            centre_cov_px2=covariance[:2, :2],
             raw_row=px[:, 1],
             localiser="template",
             bit_errors=one.wrong,
@@ -174,7 +174,7 @@ def _sound(fit: Fit, start: Floats, stones: Floats) -> bool:
 def _order(frames: Frames, match: SoftMatch, side: int) -> Ints:
     """Hypotheses worth a fit, the surest first."""
     most = np.where(frames.support >= 3, TRIED_WRONG[1], TRIED_WRONG[0])
-    worth: Bools = match.wrong * 49 <= most * side * side
+    worth: Bools = (match.wrong * 49 <= most * side * side) & (match.frame <= FRAME_WRONG)
     order = np.lexsort((-match.score, -frames.support, match.wrong))
     out: Ints = order[worth[order]]
     return out
