@@ -58,7 +58,7 @@ def _not_found(trial: Trial, board: Board, recording: BoardRecording) -> InputEr
     return InputError(
         f"the {recording.side} calibration ({recording.path.name}) shows the {board.name} in "
         f"{count} of {recording.frames} frames.",
-        finding.words,
+        finding.text,
         finding.remedy,
     )
 
