@@ -8,10 +8,15 @@ import os
 import platform
 import shutil
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from olivevib import __version__
+
+if TYPE_CHECKING:
+    from olivevib.pipeline.capture.devices import CameraReport
 
 NEEDED = (
     *("numpy", "scipy", "opencv-python-headless", "pandas", "h5py", "matplotlib", "textual"),
@@ -26,6 +31,7 @@ EXTRAS = {
 }
 CODECS = {"mjpeg": "MJPEG webcams", "h264": "H.264 files", "hevc": "H.265 files"}
 LEAST_FREE_GB = 5.0
+WEBCAMS_BYTES_S = 6e6  # two at 1280 x 720 and 30 frames/s
 
 
 @dataclass(frozen=True)
@@ -39,12 +45,18 @@ class Check:
 
 
 def examine(folder: Path) -> list[Check]:
-    """Look at the machine; ``folder`` is where trials would go. Nothing is changed."""
+    """Look at the machine; ``folder`` is where trials would go.
+
+    Every camera runs for a second; its manual settings are tried and put back.
+    """
+    from olivevib.pipeline.capture.devices import report_cameras
+
+    reports = report_cameras()
     return [
         *_versions(),
         *_codecs(),
-        *_cameras(),
-        _disk(folder),
+        *_cameras(reports),
+        _disk(folder, sum(report.rate_bytes_s for report in reports)),
         _processor(),
         *_terminal(),
     ]
@@ -78,27 +90,25 @@ def _codecs() -> list[Check]:
     ]
 
 
-def _cameras() -> list[Check]:
-    """Camera devices that the system shows (Linux: /dev/video*)."""
-    if not sys.platform.startswith("linux"):
-        return [Check("cameras", "list", "note", "cameras are listed on Linux only so far")]
-    found = sorted(Path("/sys/class/video4linux").glob("video*"))
-    if not found:
+def _cameras(reports: Sequence[CameraReport]) -> list[Check]:
+    """Every camera with its true rate, its modes, and whether manual settings hold."""
+    if not reports:
         return [Check("cameras", "none", "note", "no camera is connected; recordings still work")]
-    return [Check("cameras", f"/dev/{p.name}", "ok", _camera_name(p)) for p in found]
+    checks = []
+    for number, report in enumerate(reports):
+        sound = not report.fault and report.exposure_holds is not False
+        name = f"{number}: {report.listed.address}"
+        checks.append(Check("cameras", name, "ok" if sound else "note", report.words))
+    return checks
 
 
-def _camera_name(place: Path) -> str:
-    try:
-        return (place / "name").read_text(encoding="utf-8", errors="replace").strip()
-    except OSError:
-        return "a camera without a readable name"
-
-
-def _disk(folder: Path) -> Check:
-    free = shutil.disk_usage(folder).free / 1e9
-    words = f"{free:.0f} GB free (two MJPEG webcams fill about 1 GB in 4 minutes)"
-    return Check("disk", str(folder.resolve()), "ok" if free > LEAST_FREE_GB else "note", words)
+def _disk(folder: Path, rate_bytes_s: float) -> Check:
+    """Free space, and how long two cameras can record into it."""
+    free = shutil.disk_usage(folder).free
+    minutes = free / max(rate_bytes_s, WEBCAMS_BYTES_S) / 60
+    words = f"{free / 1e9:.0f} GB free: about {minutes:.0f} minutes of two MJPEG webcams"
+    state = "ok" if free > LEAST_FREE_GB * 1e9 else "note"
+    return Check("disk", str(folder.resolve()), state, words)
 
 
 def _processor() -> Check:

@@ -14,7 +14,7 @@ CELLS = (4, 3)  # of a picture, across and down
 LEAST_PAIRS, LEAST_SHARE, LEAST_TILTS = 20, 0.8, 3
 TILTED = 0.08  # change of distance across the board from which it counts as tilted
 TILTS = ("left", "right", "upper", "lower")  # the side that is nearer to the camera
-MOVED_SHARE = 0.04  # of the picture's width, from one view to another that counts anew
+MOVED_SHARE = 0.04  # of the picture's width (or of the distance), to a view that counts anew
 PAIR_S = 0.25
 LEAST_POINTS = 6
 
@@ -49,7 +49,7 @@ class BoardCoverage:
         self._seen[side][row, column] = True
         self._tilts |= tilts_of(view)
         spread = float(np.ptp(view.px, axis=0).max())
-        place = np.array([*view.px.mean(axis=0), spread]) / width
+        place = np.array([*view.px.mean(axis=0) / width, spread / width, *tilt_of(view)])
         self._last[side] = (view.t_s, place)
         self._count_pair()
 
@@ -90,19 +90,24 @@ class BoardCoverage:
         return " ".join(w for w in (vertical, horizontal) if w) or "rim"
 
 
-def tilts_of(view: BoardView) -> set[str]:
-    """Which sides of the board, as seen in the picture, are nearer to the camera."""
+def tilt_of(view: BoardView) -> tuple[float, float]:
+    """How much farther, in shares of its distance, the board's right and lower sides are."""
     plane = view.board_mm[:, :2].astype(np.float64)
     if len(plane) < LEAST_POINTS:
-        return set()
+        return 0.0, 0.0
     H, _ = cv2.findHomography(plane, view.px, cv2.RANSAC, 3.0)
     if H is None or not np.isfinite(H).all():
-        return set()
+        return 0.0, 0.0
     depth = plane @ H[2, :2] + H[2, 2]
-    depth = depth / depth.mean()
     place = np.column_stack([np.ones(len(plane)), view.px])
-    (_, by_x, by_y), *_ = np.linalg.lstsq(place, depth, rcond=None)
-    across, down = (float(v) for v in np.array([by_x, by_y]) * np.ptp(view.px, axis=0))
+    (_, by_x, by_y), *_ = np.linalg.lstsq(place, depth / depth.mean(), rcond=None)
+    across, down = np.ptp(view.px, axis=0) * np.array([by_x, by_y])
+    return float(across), float(down)
+
+
+def tilts_of(view: BoardView) -> set[str]:
+    """Which sides of the board, as seen in the picture, are nearer to the camera."""
+    across, down = tilt_of(view)
     out = set()
     if abs(across) > TILTED:
         out.add("left" if across > 0 else "right")

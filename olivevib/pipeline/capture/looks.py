@@ -18,7 +18,9 @@ from olivevib.marker import MarkerLayout
 SATURATED_DN = 250
 BLUR_PX, SATURATED_SHARE, WHITE_DN, CONTRAST_DN, EXPOSURE_US = 1.6, 0.02, 110.0, 60.0, 2000.0
 REACH_MODULES = 0.9  # of the profile on either side of the border: bar and quiet zone are wider
-SAMPLES = 61
+SAMPLES, ENDS = 61, 8
+LEAST_DEPTH_DN, LEAST_PROFILES = 15.0, 4
+PIXEL_PX = 0.45  # blur by the pixel's area and by interpolation between pixels
 
 
 @dataclass(frozen=True)
@@ -98,39 +100,53 @@ def _picture_levels(part: Grey) -> tuple[float, float, float]:
 def border_blur_px(grey: Grey, corners_px: Floats, layout: MarkerLayout) -> float:
     """Sigma of the blur of a marker's outer border, px; NaN where it cannot be measured.
 
-    Profiles across the middle of each side, from the dark print to the quiet zone: contrast over
-    the steepest slope is sqrt(2 pi) sigma for a Gaussian edge. Pixel area and interpolation are in
-    it (0.4 px for a perfect lens); it stays a measure, not a calibration.
+    Profiles across each side: white paper, a dark bar one module wide, white again. Depth of the
+    bar over the steepest slope grows with the blur; the pixel's own area and the interpolation are
+    taken out. Within 0.1 px from 0.5 px up to a third of a module, above that it reads low.
     """
     corners = layout.cornerstones.astype(np.float32)
     H = np.asarray(cv2.getPerspectiveTransform(corners, corners_px.astype(np.float32)), np.float64)
     half = layout.modules / 2
-    across = half + np.linspace(-REACH_MODULES, REACH_MODULES, SAMPLES)
-    widths = []
-    for turn in range(4):
-        c, s = (1, 0, -1, 0)[turn], (0, 1, 0, -1)[turn]
+    across = np.linspace(half - REACH_MODULES, half + REACH_MODULES, SAMPLES)
+    blurs = []
+    for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1)):
         for along in (-1.5, 0.0, 1.5):
-            x, y = across, np.full(SAMPLES, along)
-            line = apply_homography(H, np.column_stack([c * x - s * y, s * x + c * y]))
-            widths.append(_edge_sigma(grey, line))
-    known = [w for w in widths if math.isfinite(w)]
-    return float(np.median(known)) if len(known) >= 4 else math.nan
+            line = np.column_stack([c * across - s * along, s * across + c * along])
+            blurs.append(_bar_blur_px(grey, apply_homography(H, line)))
+    known = [b for b in blurs if math.isfinite(b)]
+    return float(np.median(known)) if len(known) >= LEAST_PROFILES else math.nan
 
 
-def _edge_sigma(grey: Grey, line: Floats) -> float:
-    """Sigma of one edge along a line (N, 2) of pixels."""
+def _bar_blur_px(grey: Grey, line: Floats) -> float:
+    """Sigma from one profile along a line (N, 2) of pixels, from the bar outward."""
     height, width = grey.shape
     if (line < 1).any() or (line[:, 0] > width - 2).any() or (line[:, 1] > height - 2).any():
         return math.nan
     at = line.astype(np.float32)
     profile = cv2.remap(grey, at[None, :, 0], at[None, :, 1], cv2.INTER_LINEAR)
     values = np.asarray(profile, dtype=np.float64).ravel()
-    contrast = float(np.mean(values[-8:]) - np.mean(values[:8]))
-    step = float(np.linalg.norm(line[-1] - line[0])) / (len(line) - 1)
-    slope = float(np.gradient(values, step).max())
-    if contrast < 15 or slope <= 0:
+    length = float(np.linalg.norm(line[-1] - line[0]))
+    depth = float(values[-ENDS:].mean() - values[: SAMPLES // 2].min())
+    slope = float(np.gradient(values, length / (SAMPLES - 1)).max())
+    if depth < LEAST_DEPTH_DN or slope <= 0:
         return math.nan
-    return contrast / slope / math.sqrt(2 * math.pi)
+    module = length / (2 * REACH_MODULES)
+    sigma = module * float(np.interp(depth / (slope * module), _WIDTHS, _BLURS))
+    return math.sqrt(max(0.0, sigma**2 - PIXEL_PX**2))
+
+
+_BLURS = np.linspace(0.02, 1.0, 99)  # sigma of the blur in modules
+
+
+def _seen_widths() -> Floats:
+    """Depth over slope of a blurred bar, in modules, for each of ``_BLURS``; it rises."""
+    erf = np.array([math.erf(1 / (2 * math.sqrt(2) * b)) for b in _BLURS])
+    edge = (1 - np.exp(-1 / (2 * _BLURS**2))) / (math.sqrt(2 * math.pi) * _BLURS)
+    out: Floats = erf / edge
+    return out
+
+
+_WIDTHS = _seen_widths()
 
 
 def advise(look: Look, controls: Controls) -> tuple[str, ...]:
