@@ -10,6 +10,7 @@ import small_trial
 from olivevib import pipeline
 from olivevib.calibration.artwork import charuco_board
 from olivevib.calibration.boards import parse_board
+from olivevib.calibration.diagnosis import diagnose
 from olivevib.errors import InputError
 from olivevib.files.rig_file import read_facts, read_rig
 from olivevib.geometry import rotation_from_vector
@@ -108,3 +109,28 @@ def test_the_papers_calibration_end_to_end(tmp_path, videos):
     assert np.linalg.norm(rig.t_right_left_mm - T_MM) < 0.02 * 250
     assert record.holdout_rms_percent < 0.5 and np.isnan(record.right_offset_sigma_s)
     assert "closed form" in read_facts(made.folder / "rig.toml")["verdict"]
+
+
+def frames_of(video: Path, count: int = 8) -> list[np.ndarray]:
+    """Grey frames spread over a recording."""
+    reader, frames = cv2.VideoCapture(str(video)), []
+    while (got := reader.read())[0]:
+        frames.append(cv2.cvtColor(got[1], cv2.COLOR_BGR2GRAY))
+    return frames[:: len(frames) // count][:count]
+
+
+WEBCAM_BOARD = "charuco:4x5,square=54,marker=40.5,dict=DICT_4X4_1000"
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    ("video", "declared", "cause"),
+    [
+        ("webcam4_charuco_C_mirrored_cam/cam_1.mp4", WEBCAM_BOARD + ",inverted", "mirrored"),
+        ("webcam4_charuco_A/cam_2.mp4", WEBCAM_BOARD, "inverted"),
+    ],
+)
+def test_real_recordings_are_diagnosed(shared_data, video, declared, cause):
+    found = diagnose(parse_board(declared), frames_of(shared_data / "calibration" / video))
+    assert found.cause == cause, found.text
+    assert found.board == parse_board(WEBCAM_BOARD + ",inverted")

@@ -107,8 +107,8 @@ def _no_camera(count: int, name: str, why: str) -> InputError:
     return InputError(
         f"The closed form finds no lens for the {name} camera: no K exists.",
         f"Of {count} views: {why}. Little tilt, blur or a strongly bending lens do that.",
-        "Tilt the board by 30 to 45 degrees to all sides, near and far; or calibrate without "
-        "--paper, which models the lens.",
+        "Tilt the board by 30 to 45 degrees to all sides, near and far; or calibrate with "
+        "--set calibration.paper=false, which models the lens.",
     )
 
 

@@ -226,7 +226,7 @@ def _cautions(poses: BoardPoses, tested: HoldOut | None) -> tuple[Caution, ...]:
             "paper-calibration",
             "Calibrated as the paper does: no lens distortion, no lag between the cameras, no "
             "sigmas.",
-            "Calibrate without --paper for the best result; use this one to compare.",
+            "For the best result: --set calibration.paper=false; use this one to compare.",
         )
     ]
     if tested is None:
@@ -243,7 +243,7 @@ def _cautions(poses: BoardPoses, tested: HoldOut | None) -> tuple[Caution, ...]:
                 "holdout-large",
                 f"On frames that the closed form did not use, distances on the board are wrong by "
                 f"{tested.rms_percent:.1f} % rms.",
-                "Calibrate without --paper: lens distortion and the lag are modelled there.",
+                "Calibrate with --set calibration.paper=false: it models lens distortion and lag.",
             )
         )
     count = int(poses.both.sum())
