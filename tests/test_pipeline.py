@@ -244,3 +244,18 @@ def test_check_tells_damage_and_what_can_be_remade(videos, tmp_path):
     states = {f.what: f.state for f in pipeline.check(trial.folder)}
     assert states["tracks.h5"] == "remake"
     assert states["right.nut"] == "lost"
+
+
+def test_a_mirrored_video_is_told(tmp_path):
+    from olivevib.simulation.recording import MjpegWriter, jpeg
+
+    videos = {side: tmp_path / f"{side}.nut" for side in ("left", "right")}
+    for side, path in videos.items():
+        with MjpegWriter(path, small_trial.SIZE, small_trial.FPS) as writer:
+            for n in range(4):
+                grey = small_trial.picture(side, n / small_trial.FPS, n)
+                grey = np.ascontiguousarray(grey[:, ::-1]) if side == "right" else grey
+                writer.write(jpeg(grey, 95), round(n / small_trial.FPS * 1e6))
+    trial = small_trial.make(tmp_path / "m", videos, ids=small_trial.IDS)
+    told = {c.code: c.text for c in pipeline.track(trial)}
+    assert "right video is mirrored" in told["mirrored-video"]

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from olivevib.detection import DetectionSettings
+import numpy as np
+
+from olivevib.detection import DetectionSettings, Detector
 from olivevib.errors import Caution
 from olivevib.files.journal import Journal
 from olivevib.files.store import write_stage
@@ -25,6 +27,7 @@ from olivevib.trial import Trial
 from olivevib.trial.fingerprints import PRIVATE
 from olivevib.trial.records.tracks import tracks_file
 
+LOOK_EVERY, LOOKS = 15, 8  # frames looked at in a mirror where no marker was found
 COMMIT_ROWS = 16  # frames acknowledged together: at most this much work is repeated after a crash
 
 
@@ -46,10 +49,33 @@ def track(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
         seen = {side: [unpack(row) for row in _payloads(journal, side)] for side in SIDES}
     finally:
         journal.close()
+    empty = [side for side in SIDES if not any(s.detections for s in seen[side])]
+    notes += tuple(c for side in empty for c in _if_mirrored(trial, library, side))
     stored = stored_tracks(trial, library, infos, seen, notes)
     write_stage(trial.folder / "tracks.h5", tracks_file(stored, now))
     journal.remove()
     return stored.cautions
+
+
+def _if_mirrored(trial: Trial, library: MarkerLibrary, side: str) -> Iterator[Caution]:
+    """A caution where a video without any marker shows some once it is flipped left to right."""
+    detector = Detector(library, trial.settings.detection)
+    hits = looked = 0
+    with Video.open(trial.path(getattr(trial.settings.cameras, side).video)) as video:
+        for frame in video.frames():
+            if frame.index % LOOK_EVERY or frame.grey is None:
+                continue
+            looked += 1
+            hits += bool(detector.detect(np.ascontiguousarray(frame.grey[:, ::-1])))
+            if looked == LOOKS:
+                break
+    if hits >= max(1, looked // 2):
+        yield Caution(
+            "mirrored-video",
+            f"The {side} video is mirrored: flipped left to right it shows markers.",
+            "Switch the mirror image off in the camera's program and record again; olivevib does "
+            "not flip recordings, because a pixel's row is its time.",
+        )
 
 
 @dataclass(frozen=True)
