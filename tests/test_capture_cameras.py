@@ -302,6 +302,20 @@ def test_manual_exposure_is_tried_and_put_back():
         assert driver.values[linux.EXPOSURE_AUTO] == 3
 
 
+def test_exposure_and_focus_are_set_by_hand():
+    driver = FakeDriver()
+    with device(driver) as camera:
+        assert camera.set_by_hand(2000.0)
+    assert driver.values[linux.EXPOSURE_AUTO] == linux.EXPOSURE_MANUAL
+    assert driver.values[linux.EXPOSURE_ABSOLUTE] == 20
+    assert (driver.values[linux.FOCUS_AUTO], driver.values[linux.EXPOSURE_PRIORITY]) == (0, 0)
+    driver = FakeDriver()
+    driver.values = {}
+    driver._s_ctrl = driver._g_ctrl
+    with device(driver) as camera:
+        assert not camera.set_by_hand(2000.0)
+
+
 # --- clocks
 
 

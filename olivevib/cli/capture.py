@@ -69,11 +69,13 @@ def _plan(arguments: argparse.Namespace) -> CapturePlan:
     from olivevib.files.capture import Mode
     from olivevib.pipeline.capture import CapturePlan
 
+    size = values.picture_size(arguments.size)
+    exposure_us = None if arguments.exposure is None else arguments.exposure * 1000
     return CapturePlan(
         left=arguments.left,
         right=arguments.right,
         seconds=arguments.seconds,
-        mode=Mode(values.picture_size(arguments.size), arguments.fps),
+        mode=Mode(size, arguments.fps, exposure_us),
         board=arguments.board,
         markers=arguments.markers,
         ids=values.id_list(arguments.ids),

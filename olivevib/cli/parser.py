@@ -105,6 +105,9 @@ def _capture_verb(verbs: Any) -> None:
     parser.add_argument("--seconds", type=float, metavar="S", help="length (default: to Ctrl-C)")
     parser.add_argument("--size", metavar="WxH", help="picture size, such as 1280x720")
     parser.add_argument("--fps", type=float, metavar="N", help="frames a second")
+    parser.add_argument(
+        "--exposure", type=float, metavar="MS", help="fixed, with the focus (Linux)"
+    )
     parser.add_argument("--board", metavar="SPEC", help="record the calibration board instead")
     parser.add_argument("--markers", metavar="LIB", default="olive49", help="marker library")
     parser.add_argument("--ids", metavar="1,2,5-9", help="the markers on the tree")
@@ -214,6 +217,13 @@ def _result_verbs(verbs: Any) -> None:
     check.add_argument("trial", metavar="TRIAL")
 
 
+_LAMP = """\
+Let an LED flash at a known frequency, such as 500 Hz (no multiple of half the frame rate), through
+paper right before the lens, with an exposure of less than half a flash. Record some seconds with
+olivevib capture. Stripes must travel over the picture.
+"""
+
+
 def _other_verbs(verbs: Any) -> None:
     demo = _add(verbs, "demo", "simulated:demo", "a simulated trial, measured, against its truth")
     demo.add_argument("dir", nargs="?", metavar="DIR", help="a new folder (default: demo)")
@@ -227,5 +237,9 @@ def _other_verbs(verbs: Any) -> None:
     simulate.add_argument("--scenario", metavar="NAME", help="see --list")
     simulate.add_argument("--seed", type=int, default=1, metavar="N")
     simulate.add_argument("--list", action="store_true", help="name and describe the scenarios")
+    rowtime = _add(verbs, "rowtime", "row_time:row_time", "a camera's row time from a lamp", _LAMP)
+    rowtime.add_argument("file", metavar="FILE", help="a recording of the lamp")
+    rowtime.add_argument("--led", type=float, required=True, metavar="HZ", help="flashes a second")
+    rowtime.add_argument("--camera", metavar="NAME", help="whose it is, where the file cannot say")
     doctor = _add(verbs, "doctor", "doctor:doctor", "what works on this machine")
     doctor.add_argument("--json", action="store_true", help="for programs")

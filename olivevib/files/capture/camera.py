@@ -42,10 +42,15 @@ class Controls(NamedTuple):
 
 @dataclass(frozen=True)
 class Mode:
-    """What a camera is asked for; None: what it does by itself."""
+    """What a camera is asked for; None: what it does by itself.
+
+    exposure_us: set by hand, with the focus held and the frame rate not lowered in the dark; only
+    where the driver can (v4l2).
+    """
 
     size_px: tuple[int, int] | None = None
     fps: float | None = None
+    exposure_us: float | None = None
 
 
 @dataclass(frozen=True)

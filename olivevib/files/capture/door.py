@@ -6,7 +6,7 @@ import functools
 from contextlib import suppress
 from pathlib import Path
 
-from olivevib.errors import UsageError
+from olivevib.errors import InputError, UsageError
 from olivevib.files.capture.camera import Camera, Controls, Mode
 from olivevib.files.capture.device import DeviceCamera
 from olivevib.files.capture.http_stream import HttpCamera
@@ -43,7 +43,26 @@ def open_camera(name: str, mode: Mode, side: str) -> Camera:
             "Switch the camera to MJPEG and give its http:// address.",
         )
     listed = find_camera(name)
-    return DeviceCamera(listed, mode, functools.partial(_controls, listed))
+    camera = DeviceCamera(listed, mode, functools.partial(_controls, listed))
+    if mode.exposure_us is not None and not _set_by_hand(listed, mode.exposure_us):
+        camera.close()
+        asked_ms = mode.exposure_us / 1000
+        raise InputError(
+            f"the camera {listed.title} does not take an exposure of {asked_ms:g} ms.",
+            "Its driver has no such setting, or does not keep it.",
+            "Set it with the camera's own program and leave --exposure out.",
+        )
+    return camera
+
+
+def _set_by_hand(listed: Listed, exposure_us: float) -> bool:
+    if listed.kind != "v4l2":
+        return False
+    try:
+        with V4l2Device(listed.address) as device:
+            return device.set_by_hand(exposure_us)
+    except OSError:
+        return False
 
 
 def _controls(listed: Listed) -> Controls:

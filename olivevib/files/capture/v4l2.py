@@ -146,6 +146,19 @@ class V4l2Device:
             None if gain is None else float(gain),
         )
 
+    def set_by_hand(self, exposure_us: float) -> bool:
+        """Fix exposure, focus and frame rate; False where the exposure is not kept.
+
+        The driver may round the exposure to its own steps, by less than a quarter.
+        """
+        self.set(EXPOSURE_PRIORITY, 0)
+        self.set(FOCUS_AUTO, 0)
+        wanted = max(1, round(exposure_us / EXPOSURE_UNIT_US))
+        if not (self.set(EXPOSURE_AUTO, EXPOSURE_MANUAL) and self.set(EXPOSURE_ABSOLUTE, wanted)):
+            return False
+        kept = self.get(EXPOSURE_ABSOLUTE)
+        return kept is not None and abs(kept - wanted) <= wanted / 4
+
     def manual_exposure_holds(self) -> bool | None:
         """Whether manual exposure can be set and is read back; None: there is none.
 

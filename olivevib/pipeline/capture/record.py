@@ -40,7 +40,7 @@ def capture(
     UsageError or InputError before anything is recorded: a name that means no camera, a camera that
     delivers nothing, recordings that are there already, no room on the disk.
     """
-    library = only_known(load_library(plan.markers), plan.ids)
+    library = only_known(load_library(plan.markers), () if plan.board else plan.ids)
     board = None if plan.board is None else parse_board(plan.board)
     _check(folder, plan)
     cameras, reopen = _open(plan, tick)

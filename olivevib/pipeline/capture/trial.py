@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import statistics
 import tomllib
 from contextlib import suppress
 from pathlib import Path
 
 from olivevib.errors import UsageError
-from olivevib.files.capture import sidecar_of
+from olivevib.files.capture import read_sidecar, sidecar_of
 from olivevib.pipeline.capture.plan import Captured, CapturePlan
 from olivevib.pipeline.capture.record import RECORD
 from olivevib.pipeline.new import NewTrial, new_trial
 from olivevib.progress import Tick, silent
 from olivevib.trial import Trial
+from olivevib.trial.camera_book import CameraMode, recall, workspace_of
 from olivevib.trial.document import FILE
 
 CALIBRATION = "calibration"
@@ -67,7 +69,37 @@ def trial_from(
         band_hz=plan.band_hz,
         simulated=any(name.startswith("simulated:") for name in (plan.left, plan.right)),
     )
-    return new_trial(folder, told, tick)
+    trial = new_trial(folder, told, tick)
+    facts = _camera_facts(folder)
+    return trial.changed(facts) if facts else trial
+
+
+def _camera_facts(folder: Path) -> dict[str, object]:
+    """What is known of the cameras beside the recordings: exposure, and row time by the book."""
+    out: dict[str, object] = {}
+    workspace = workspace_of(folder)
+    record = tomllib.loads((folder / RECORD).read_text(encoding="utf-8"))
+    for side in ("left", "right"):
+        told = record[side]
+        camera = str(told.get("serial") or told["title"])
+        width, height = told["size_px"]
+        mode = CameraMode(camera, (int(width), int(height)), float(told.get("rate_hz", 0.0)))
+        entry = recall(workspace, mode) if workspace else None
+        if entry is not None:
+            out["cameras.shutter"] = "rolling"
+            out[f"cameras.{side}.row_time_us"] = entry.row_time_us
+            out[f"cameras.{side}.row_time_sigma_us"] = entry.sigma_us
+        exposure = _exposure_ms(folder / f"{side}.nut")
+        if exposure is not None:
+            out[f"cameras.{side}.exposure_ms"] = exposure
+    return out
+
+
+def _exposure_ms(video: Path) -> float | None:
+    """The middle exposure of a recording as the driver told it; None where it did not."""
+    sidecar = read_sidecar(sidecar_of(video))
+    known = [line.exposure_us for line in sidecar.lines if line.exposure_us] if sidecar else []
+    return statistics.median(known) / 1000 if known else None
 
 
 def board_in(folder: Path) -> str | None:
