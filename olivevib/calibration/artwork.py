@@ -2,62 +2,78 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from olivevib.arrays import Floats
+from olivevib.arrays import Floats, Ints
 from olivevib.calibration.boards import Board, markers_on, predefined
 
 Image = NDArray[np.float32]
-CELL_PX = 96  # template pixels a square, or a marker with its gap; fewer on large boards
-MOST_PX = 400_000  # template pixels of a whole board
-BLURS = 0.6 * 1.35 ** np.arange(12)  # Gaussian blurs at which the print is kept, template px
+CELL_PX = 160  # template pixels a square, or a marker with its gap; fewer on large boards
+MOST_PX = 1_000_000  # template pixels of a whole board
+BLURS = 1.35 ** np.arange(12)  # Gaussian blurs at which the print is drawn, template px
 
 
-@dataclass(frozen=True)
 class Artwork:
-    """A printed board, blurred more and more, with its slopes.
+    """A printed board as dark squares, drawn with as much blur as the camera adds.
 
-    layers (one a blur): float32 (H, W, 3) of grey 0...1 and its derivatives by template x and y;
-    px_per_mm; corner_mm (2,): board point of the outer corner of pixel (0, 0); reach_mm (N,): half
-    the side of the square patch that belongs to each point. The patches of a board do not overlap,
-    so the errors of its points are independent.
+    px_per_mm; corner_mm (2,): board point of the outer corner of template pixel (0, 0); reach_mm
+    (N,): half the side of the square patch that belongs to each point. The patches of a board do
+    not overlap, so the errors of its points are independent. Drawings are kept once made.
     """
 
-    layers: tuple[Image, ...]
-    px_per_mm: float
-    corner_mm: Floats
-    reach_mm: Floats
+    def __init__(self, board: Board) -> None:
+        dark_mm, corner, size_mm = dark_squares(board)
+        cells = (board.columns + 1) * (board.rows + 1)
+        self.px_per_mm = min(CELL_PX, np.sqrt(MOST_PX / cells)) / board.pitch_mm
+        self.corner_mm = corner
+        self.reach_mm = _reach(board)
+        self._squares = (dark_mm - np.tile(corner, 2)) * self.px_per_mm
+        self._size = np.ceil(size_mm * self.px_per_mm - 1e-9).astype(np.int64)
+        self._sign = -1.0 if board.inverted else 1.0
+        self._drawn: dict[int, Image] = {}
 
     def pixels(self, board_mm: Floats) -> Image:
         """Template pixels (N, 2) of board points (N, 2)."""
         px = (board_mm - self.corner_mm) * self.px_per_mm - 0.5
-        return px.astype(np.float32)
+        return np.asarray(px, dtype=np.float32)
 
-    def layer(self, blur_px: float) -> Image:
-        """The layer whose blur is nearest to ``blur_px`` template pixels."""
-        return self.layers[int(np.abs(np.log(BLURS / blur_px)).argmin())]
+    def clip(self, level: int) -> int:
+        """The nearest level of blur that exists."""
+        return min(max(level, 0), len(BLURS) - 1)
+
+    def level(self, blur_px: float) -> int:
+        """The level whose blur is nearest to ``blur_px`` template pixels."""
+        return int(np.abs(np.log(BLURS / blur_px)).argmin())
+
+    def layer(self, level: int) -> Image:
+        """Grey 0...1 and its slopes by x and y (H, W, 3) at a level of blur."""
+        if level not in self._drawn:
+            drawn = blurred_squares(self._squares, self._size, float(BLURS[level]))
+            ink = -self._sign * drawn
+            ink[:, :, 0] += self._sign > 0
+            self._drawn[level] = ink.astype(np.float32)
+        return self._drawn[level]
 
 
-def draw_artwork(board: Board) -> Artwork:
-    """The artwork of a ChArUco board, ArUco grid or chessboard."""
-    draw = {"charuco": _charuco, "arucogrid": _arucogrid, "chessboard": _chessboard}[board.kind]
-    cells = (board.columns + 1) * (board.rows + 1)
-    cell = int(min(CELL_PX, max(16, np.sqrt(MOST_PX / cells))))
-    grey, corner = draw(board, cell)
-    ink = np.asarray(255 - grey if board.inverted else grey, dtype=np.float32) / np.float32(255)
-    layers = tuple(_layer(ink, float(blur)) for blur in BLURS)
-    return Artwork(layers, cell / board.pitch_mm, corner, _reach(board))
+def blurred_squares(squares: Floats, size_px: Ints, sigma_px: float) -> Floats:
+    """Squares x0 y0 x1 y1 (S, 4) px of darkness 1 under a Gaussian blur, exact at pixel centres.
 
+    Returns darkness and its derivatives by x and y (H, W, 3); size (W, H). Nothing is drawn on
+    whole pixels first, so edges stand where they are to any fraction of a pixel.
+    """
+    from scipy.special import ndtr
 
-def _layer(grey: Image, blur_px: float) -> Image:
-    soft = cv2.GaussianBlur(grey, (0, 0), blur_px, borderType=cv2.BORDER_REPLICATE)
-    x = cv2.Sobel(soft, cv2.CV_32F, 1, 0, ksize=1) * 0.5
-    y = cv2.Sobel(soft, cv2.CV_32F, 0, 1, ksize=1) * 0.5
-    return np.dstack([soft, x, y])
+    sides = []
+    for k, n in enumerate(size_px):
+        centre = np.arange(n) + 0.5
+        low, high = ((centre - squares[:, j, None]) / sigma_px for j in (k, k + 2))
+        bell = np.exp(-0.5 * low**2) - np.exp(-0.5 * high**2)
+        sides.append((ndtr(low) - ndtr(high), bell / (np.sqrt(2 * np.pi) * sigma_px)))
+    (across, slope_x), (down, slope_y) = sides
+    layers = [down.T @ across, down.T @ slope_x, slope_y.T @ across]
+    return np.asarray(np.stack(layers, axis=2), dtype=np.float64)
 
 
 def _reach(board: Board) -> Floats:
@@ -65,39 +81,65 @@ def _reach(board: Board) -> Floats:
     return np.full(len(board.points_mm), share)
 
 
-def _charuco(board: Board, cell: int) -> tuple[NDArray[np.uint8], Floats]:
-    size = (board.columns * cell, board.rows * cell)
-    return np.asarray(charuco_board(board).generateImage(size)), np.zeros(2)
-
-
 def charuco_board(board: Board) -> cv2.aruco.CharucoBoard:
     """OpenCV's board of the same description."""
     lengths = board.lengths_mm
-    made = cv2.aruco.CharucoBoard(
-        (board.columns, board.rows),
-        lengths["square"],
-        lengths["marker"],
-        predefined(board.dictionary),
-    )
+    book = predefined(board.dictionary)
+    shape = (board.columns, board.rows)
+    made = cv2.aruco.CharucoBoard(shape, lengths["square"], lengths["marker"], book)
     made.setLegacyPattern(board.legacy)
     return made
 
 
-def _arucogrid(board: Board, cell: int) -> tuple[NDArray[np.uint8], Floats]:
-    side = round(cell * board.lengths_mm["size"] / board.pitch_mm)
-    margin = cell - side
-    grey = np.full((board.rows * cell + margin, board.columns * cell + margin), 255, np.uint8)
-    dictionary = predefined(board.dictionary)
-    for k in range(markers_on(board.kind, board.columns, board.rows)):
-        row, column = divmod(k, board.columns)
-        y, x = margin + row * cell, margin + column * cell
-        marker = cv2.aruco.generateImageMarker(dictionary, k, side)
-        grey[y : y + side, x : x + side] = marker
-    return grey, np.full(2, -margin * board.pitch_mm / cell)
+def dark_squares(board: Board) -> tuple[Floats, Floats, Floats]:
+    """Dark squares x0 y0 x1 y1 (S, 4), first corner (2,) and size (2,) of the print, mm."""
+    return {"charuco": _charuco, "arucogrid": _arucogrid, "chessboard": _chessboard}[board.kind](
+        board
+    )
 
 
-def _chessboard(board: Board, cell: int) -> tuple[NDArray[np.uint8], Floats]:
-    dark = np.indices((board.rows + 1, board.columns + 1)).sum(axis=0) % 2 == 0
-    grey = np.where(dark, 0, 255).astype(np.uint8)
-    grey = np.kron(grey, np.ones((cell, cell), np.uint8))
-    return grey, np.full(2, -board.pitch_mm)
+def _charuco(board: Board) -> tuple[Floats, Floats, Floats]:
+    square, marker = board.lengths_mm["square"], board.lengths_mm["marker"]
+    theirs = charuco_board(board)
+    row, column = np.divmod(np.arange(board.rows * board.columns), board.columns)
+    corners = np.array([np.asarray(quad)[0, :2] for quad in theirs.getObjPoints()])
+    white = np.floor(corners / square).astype(np.int64)
+    dark = ~np.isin(row * board.columns + column, white[:, 1] * board.columns + white[:, 0])
+    at = np.column_stack([column, row])[dark] * square
+    squares = [np.column_stack([at, at + square])]
+    squares += [
+        _marker(board.dictionary, int(k), marker) + np.tile(corner, 2)
+        for k, corner in zip(np.ravel(theirs.getIds()), corners, strict=True)
+    ]
+    size = np.array([board.columns, board.rows]) * square
+    return np.concatenate(squares), np.zeros(2), size
+
+
+def _arucogrid(board: Board) -> tuple[Floats, Floats, Floats]:
+    size, gap, pitch = board.lengths_mm["size"], board.lengths_mm["gap"], board.pitch_mm
+    count = markers_on(board.kind, board.columns, board.rows)
+    squares = [
+        _marker(board.dictionary, k, size)
+        + np.tile(np.array([k % board.columns, k // board.columns]) * pitch, 2)
+        for k in range(count)
+    ]
+    whole = np.array([board.columns, board.rows]) * pitch + gap
+    return np.concatenate(squares), np.full(2, -gap), whole
+
+
+def _marker(dictionary: str, number: int, size_mm: float) -> Floats:
+    """Dark modules x0 y0 x1 y1 (S, 4) of one marker, mm from its upper left corner."""
+    book = predefined(dictionary)
+    modules = book.markerSize + 2
+    image = cv2.aruco.generateImageMarker(book, number, modules)
+    at = np.argwhere(np.asarray(image) < 128)[:, ::-1] * (size_mm / modules)
+    return np.asarray(np.column_stack([at, at + size_mm / modules]), dtype=np.float64)
+
+
+def _chessboard(board: Board) -> tuple[Floats, Floats, Floats]:
+    square = board.lengths_mm["square"]
+    row, column = np.indices((board.rows + 1, board.columns + 1)).reshape(2, -1)
+    dark = (row + column) % 2 == 0
+    at = np.column_stack([column, row])[dark] * square - square
+    size = np.array([board.columns + 1, board.rows + 1]) * square
+    return np.column_stack([at, at + square]), np.full(2, -square), size

@@ -20,7 +20,7 @@ from olivevib.arrays import Bools, Floats, Grey, Ints
 from olivevib.calibration.artwork import Artwork, Image
 from olivevib.calibration.warp import Warp, bent_warp, sane
 
-BLURS_PX = (0.5, 0.9, 1.8)  # Gaussian blur of the camera, one is chosen a view
+FIRST_BLUR_PX = 0.8  # Gaussian blur of a camera to begin with; one is chosen a view
 MOST_PIXELS = 12_000  # of one view; larger patches are cut down, but not below the next
 LEAST_PER_POINT = 400
 FLOOR_PX = 0.02  # what no template knows: sharpening, compression, print
@@ -183,23 +183,28 @@ def _sample(layer: Image, px: Image) -> Floats:
     return np.asarray(out.reshape(-1, 3)[:n], dtype=np.float64)
 
 
-def _blurred(artwork: Artwork, scale: float) -> list[Image]:
-    """The print as the camera may blur it; ``scale``: template pixels an image pixel."""
-    return [artwork.layer(float(np.hypot(blur, 12**-0.5)) * scale) for blur in BLURS_PX]
-
-
 def _rough(artwork: Artwork, patches: _Patches, scale: float) -> _Descent:
-    """A few steps at a middle blur."""
-    layer = _blurred(artwork, scale)[1]
+    """A few steps at a middle blur; ``scale``: template pixels an image pixel."""
+    layer = artwork.layer(artwork.level(FIRST_BLUR_PX * scale))
     return _descend(artwork, patches, layer, np.zeros((patches.start.size, 2)), 4)
 
 
 def _fine(artwork: Artwork, patches: _Patches, scale: float) -> _Descent:
-    """All steps at the blur that leaves the least residual."""
+    """All steps at the blur that leaves the least residual, found by walking up or down."""
     zero = np.zeros((patches.start.size, 2))
-    layers = _blurred(artwork, scale)
-    rests = [_rest(artwork, patches, layer, zero) for layer in layers]
-    return _descend(artwork, patches, layers[int(np.argmin(rests))], zero, 6)
+    rests: dict[int, float] = {}
+
+    def rest(level: int) -> float:
+        if level not in rests:
+            rests[level] = _rest(artwork, patches, artwork.layer(level), zero)
+        return rests[level]
+
+    level = artwork.level(FIRST_BLUR_PX * scale)
+    while True:
+        best = min((level, level - 1, level + 1), key=lambda k: rest(artwork.clip(k)))
+        if artwork.clip(best) == level:
+            return _descend(artwork, patches, artwork.layer(level), zero, 6)
+        level = artwork.clip(best)
 
 
 @dataclass(frozen=True)

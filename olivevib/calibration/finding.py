@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Floats, Grey, Ints
-from olivevib.calibration.artwork import Artwork, charuco_board, draw_artwork
+from olivevib.calibration.artwork import Artwork, charuco_board
 from olivevib.calibration.boards import CORNERS_PER_MARKER, Board, markers_on, predefined
 from olivevib.calibration.corners import refine
 from olivevib.calibration.views import BoardView
@@ -37,7 +37,7 @@ class BoardFinder:
             raise ValueError("a coded board, and only a coded board, needs a reader")
         self.board = board
         self._reader = reader
-        self._artwork: Artwork | None = None if reader else draw_artwork(board)
+        self._artwork: Artwork | None = None if reader else Artwork(board)
         self._search: Callable[[Grey], Raw | None] = lambda grey: None
         if reader is None:
             self._search = _SEARCHES[board.kind](board)
