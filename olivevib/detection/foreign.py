@@ -28,8 +28,8 @@ def dictionary(name: str) -> Any:
 class ForeignReader:
     """Reads one OpenCV dictionary, dark on light and light on dark, in any grey image.
 
-    Each polarity has a pass of its own: OpenCV's detectInvertedMarker looks for light squares with a
-    threshold made for dark ones and misses a fifth of them.
+    Each polarity has a pass of its own: OpenCV's detectInvertedMarker looks for light squares with
+    a threshold made for dark ones and misses a fifth of them.
     Corners are the outer corners of the square. Without a clear edge on all four sides the corners
     are OpenCV's own and the detection is flagged "unrefined".
     """
