@@ -125,7 +125,9 @@ def test_an_open_scheduler_elsewhere_is_refused_with_the_remedy(address):
     assert "tls://" in caught.value.remedy
 
 
-@pytest.mark.parametrize("address", ["http://127.0.0.1:8786", "ucx://127.0.0.1:1", "tcp://[::1"])
+@pytest.mark.parametrize(
+    "address", ["http://127.0.0.1:8786", "ucx://127.0.0.1:1", "tcp://[::1", "localhost"]
+)
 def test_what_is_no_address_is_told(address):
     with pytest.raises(UsageError, match="no address"):
         check_address(address)

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import ipaddress
 import queue
-import threading
-import time
+import socket
 import uuid
 from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
@@ -16,12 +15,13 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from olivevib.batch.outlook import Outlook
+from olivevib.batch.remote import measure_remotely
 from olivevib.batch.result import TrialResult
 from olivevib.errors import InputError, OlivevibError, UsageError
-from olivevib.progress import Cancelled, Tick, silent
+from olivevib.progress import Tick, silent
 
 POLL_S = 0.25
-ANSWERS_IN = "10s"
+ANSWERS_S = 10
 START = (
     "Start one: dask scheduler --host 127.0.0.1, then a worker a core: "
     "dask worker ADDRESS --nworkers 2 --nthreads 1"
@@ -49,10 +49,10 @@ def measure_on_cluster(
 
 def check_address(address: str) -> None:
     """UsageError where the address is neither on this machine nor behind TLS."""
-    scheme, host = _parts(address)
-    if scheme == "tls" or (scheme == "tcp" and _is_here(host)):
+    scheme, host, port = _parts(address)
+    if port and (scheme == "tls" or (scheme == "tcp" and _is_here(host))):
         return
-    if scheme != "tcp":
+    if scheme != "tcp" or not port:
         raise UsageError(
             f"--scheduler {address} is no address of a scheduler.",
             "",
@@ -62,18 +62,18 @@ def check_address(address: str) -> None:
         f"--scheduler {address} is on another machine and not encrypted.",
         "Whoever reaches a Dask scheduler without TLS can run any code on its workers.",
         "Set up TLS (https://distributed.dask.org/en/stable/tls.html) and write "
-        f"tls://{host or 'HOST'}:8786, or tunnel it: ssh -L 8786:localhost:8786 "
-        f"{host or 'HOST'}, and write tcp://127.0.0.1:8786.",
+        f"tls://{host}:{port}, or tunnel it: ssh -L {port}:localhost:{port} {host}, "
+        f"and write tcp://127.0.0.1:{port}.",
     )
 
 
-def _parts(address: str) -> tuple[str, str]:
-    """Scheme (tcp where none is written) and host of an address; empty where there is none."""
+def _parts(address: str) -> tuple[str, str, int]:
+    """Scheme (tcp where none is written), host and port of an address; 0 where it has no port."""
     try:
         parts = urlsplit(address if "://" in address else f"tcp://{address}")
-        return parts.scheme, parts.hostname or ""
+        return parts.scheme, parts.hostname or "", parts.port or 0
     except ValueError:
-        return "", ""
+        return "", "", 0
 
 
 def _is_here(host: str) -> bool:
@@ -92,10 +92,30 @@ def _connect(address: str) -> Any:
             "",
             "Install it: pip install 'olivevib[cluster]'; --workers N needs nothing more.",
         ) from error
+    scheme, host, port = _parts(address)
     try:
-        return distributed.Client(address, timeout=ANSWERS_IN, set_as_default=False)
+        if (
+            scheme == "tls"
+            and not distributed.Security().get_connection_args("client")["ssl_context"]
+        ):
+            raise _no_certificates(address)
+        socket.create_connection((host, port), ANSWERS_S).close()
+        return distributed.Client(address, timeout=ANSWERS_S, set_as_default=False)
     except (OSError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(f"no scheduler answers at {address}.", f"{error}", START) from error
+
+
+def _has_certificates(security: Any) -> bool:
+    return bool(security.get_connection_args("client").get("ssl_context"))
+
+
+def _no_certificates(address: str) -> UsageError:
+    return UsageError(
+        f"--scheduler {address} needs certificates, and none are configured here.",
+        "A connection by TLS proves both ends to each other.",
+        "Name them in ~/.config/dask/distributed.yaml under comm.tls (ca-file, client.cert, "
+        "client.key): https://distributed.dask.org/en/stable/tls.html",
+    )
 
 
 def _results(client: Any, trials: list[str], tick: Tick) -> Iterator[TrialResult]:
@@ -128,7 +148,7 @@ def _results(client: Any, trials: list[str], tick: Tick) -> Iterator[TrialResult
 
 def _who_works(client: Any) -> str:
     count = len(client.nthreads())
-    return f"{count} workers" if count else "no worker is connected yet"
+    return f"{count} worker{'s' * (count != 1)}" if count else "no worker is connected yet"
 
 
 def _result(future: Any, trial: str) -> TrialResult:
@@ -147,42 +167,3 @@ def _result(future: Any, trial: str) -> TrialResult:
             "and look into the workers' logs; then run the same command again.",
         ),
     )
-
-
-# --- on the workers -----------------------------------------------------------------------
-
-_ONE_TRIAL = threading.Lock()  # a worker with several threads measures one trial at a time
-_LOOKS_S = 0.5
-
-
-def measure_remotely(trial: str) -> str:
-    """The task that a worker runs: one trial; the result as JSON."""
-    from olivevib.batch.unit import measure, use_one_core
-
-    watch = _Withdrawn()
-    use_one_core()
-    while not _ONE_TRIAL.acquire(timeout=_LOOKS_S):
-        watch(0, None, "")
-    try:
-        return measure(Path(trial), watch).to_json()
-    finally:
-        _ONE_TRIAL.release()
-
-
-class _Withdrawn:
-    """The tick on a worker: raises Cancelled once nobody wants this task any more."""
-
-    def __init__(self) -> None:
-        from distributed.worker import get_worker, thread_state
-
-        self._tasks, self._key = get_worker().state.tasks, thread_state.key
-        self._looked = float("-inf")
-
-    def __call__(self, done: int, total: int | None, note: str) -> None:
-        """Look now and then."""
-        if time.monotonic() - self._looked < _LOOKS_S:
-            return
-        self._looked = time.monotonic()
-        task = self._tasks.get(self._key)
-        if task is None or task.state == "cancelled":
-            raise Cancelled

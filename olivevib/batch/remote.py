@@ -1,0 +1,45 @@
+"""What runs on a worker of a Dask cluster: one trial, which stops when nobody wants it any more."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+
+from olivevib.progress import Cancelled
+
+_ONE_TRIAL = threading.Lock()  # a worker with several threads measures one trial at a time
+_LOOKS_S = 0.5
+
+
+def measure_remotely(trial: str) -> str:
+    """The task that a worker runs: one trial; the result as JSON."""
+    from olivevib.batch.unit import measure, use_one_core
+
+    watch = _Withdrawn()
+    use_one_core()
+    while not _ONE_TRIAL.acquire(timeout=_LOOKS_S):
+        watch(0, None, "")
+    try:
+        return measure(Path(trial), watch).to_json()
+    finally:
+        _ONE_TRIAL.release()
+
+
+class _Withdrawn:
+    """The tick on a worker: raises Cancelled once the scheduler has taken the task back."""
+
+    def __init__(self) -> None:
+        from distributed.worker import get_worker, thread_state
+
+        self._tasks, self._key = get_worker().state.tasks, thread_state.key
+        self._looked = float("-inf")
+
+    def __call__(self, done: int, total: int | None, note: str) -> None:
+        """Look now and then."""
+        if time.monotonic() - self._looked < _LOOKS_S:
+            return
+        self._looked = time.monotonic()
+        task = self._tasks.get(self._key)
+        if task is None or task.state == "cancelled":
+            raise Cancelled
