@@ -15,7 +15,7 @@ LEAST_PAIRS, LEAST_SHARE, LEAST_TILTS = 20, 0.8, 3
 TILTED = 0.08  # change of distance across the board from which it counts as tilted
 TILTS = ("left", "right", "upper", "lower")  # the side that is nearer to the camera
 MOVED_SHARE = 0.04  # of the picture's width (or of the distance), to a view that counts anew
-PAIR_S = 0.25
+PAIR_S = 0.06  # both cameras' views of one instant: two frames at 30 a second
 LEAST_POINTS = 6
 
 Size = tuple[int, int]

@@ -15,7 +15,7 @@ from olivevib.arrays import Grey
 from olivevib.calibration.boards import Board
 from olivevib.calibration.finding import BoardFinder
 from olivevib.detection import Detector
-from olivevib.files.capture import CameraRunner
+from olivevib.files.capture import CameraRunner, Shot
 from olivevib.marker import MarkerLibrary
 from olivevib.pipeline.capture.coverage import BoardCoverage, Coverage
 from olivevib.pipeline.capture.looks import Look, grey_of_shot, look_at
@@ -37,9 +37,9 @@ class Seen:
 
 
 class Looker:
-    """Decodes the latest picture of each camera in turn and measures it.
+    """Decodes the latest pictures of both cameras, of one instant, and measures them.
 
-    ``origin_ns``: the start of the recording; looks before it are shown but not counted.
+    Looks before ``begin`` are shown but not counted.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class Looker:
     ) -> None:
         self.latest: dict[str, tuple[Look, Grey]] = {}
         self.failure: BaseException | None = None
-        self.origin_ns: int | None = None
+        self._origin_ns: int | None = None
         self._runners = runners
         self._library = library
         self._detector = Detector(library)
@@ -65,6 +65,12 @@ class Looker:
     def start(self) -> None:
         """Begin to look."""
         self._thread.start()
+
+    def begin(self, origin_ns: int) -> None:
+        """The recording begins: from now on looks count, and their times start at zero."""
+        with self._lock:
+            self._origin_ns = origin_ns
+            self._senses = {side: MotionSense() for side in self._runners}
 
     def finish(self) -> None:
         """Stop looking."""
@@ -100,15 +106,16 @@ class Looker:
             while not self._stop.is_set():
                 began = time.monotonic()
                 busy = time.thread_time()
-                looked = [self._look(side) for side in self._runners]
+                now = {side: runner.state().latest for side, runner in self._runners.items()}
+                looked = [self._look(side, latest) for side, latest in now.items()]
                 busy = time.thread_time() - busy
                 rest = max(busy / SHARE, 1 / MOST_HZ) - (time.monotonic() - began)
                 self._stop.wait(max(rest, IDLE_S) if any(looked) else IDLE_S)
         except BaseException as error:  # handed to the supervisor, which raises it
             self.failure = error
 
-    def _look(self, side: str) -> bool:
-        latest = self._runners[side].state().latest
+    def _look(self, side: str, latest: tuple[Shot, int] | None) -> bool:
+        """Measure one picture; False where it is none, or was measured before."""
         if latest is None or latest[1] == self._done[side]:
             return False
         shot, placed_ns = latest
@@ -116,13 +123,12 @@ class Looker:
         grey = grey_of_shot(shot, self._runners[side].facts)
         if grey is None:
             return True
-        origin = self.origin_ns
-        t_s = (placed_ns - (origin or 0)) * 1e-9
-        look = self._measured(grey, t_s)
+        origin = self._origin_ns
+        look = self._measured(grey, (placed_ns - (origin or 0)) * 1e-9)
         with self._lock:
             self.latest[side] = (look, grey)
-            self._senses[side].add(look)
             if origin is not None and placed_ns >= origin:
+                self._senses[side].add(look)
                 self._count(side, look, (grey.shape[1], grey.shape[0]))
         return True
 

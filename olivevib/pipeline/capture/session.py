@@ -100,7 +100,7 @@ class Session:
         for side in SIDES:
             self.runners[side].record(videos[side], self._origin_ns)
         if self.looker is not None:
-            self.looker.origin_ns = self._origin_ns
+            self.looker.begin(self._origin_ns)
         self._disk.start()
         return videos
 
