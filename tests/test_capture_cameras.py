@@ -19,7 +19,8 @@ from hypothesis import strategies as st
 from small_videos import make_video
 
 from olivevib.errors import InputError, UsageError
-from olivevib.files.capture import Listed, Mode, Shot, find_camera, open_camera
+from olivevib.files.capture import Controls, Listed, Mode, Shot, find_camera, open_camera
+from olivevib.files.capture import device as device_room
 from olivevib.files.capture import v4l2 as linux
 from olivevib.files.capture.clock import StampClock
 from olivevib.files.capture.device import open_options
@@ -223,6 +224,35 @@ def test_a_device_is_asked_for_mjpeg_in_the_wanted_mode():
     assert v4l2 == {**wanted, "input_format": "mjpeg", "timestamps": "default"}
     assert open_options("avfoundation", mode) == wanted
     assert "rtbufsize" in open_options("dshow", Mode())
+
+
+def test_a_device_hands_on_what_ffmpeg_reads_until_it_is_unplugged(tmp_path, monkeypatch):
+    """A NUT file stands in for the device: the same way through PyAV, and an end that is sudden."""
+    monkeypatch.setitem(device_room.STAMP_KINDS, "nut", "kernel")
+    video = make_video(tmp_path / "device.nut", frames=12)
+    listed = Listed("nut", str(video), "HD Webcam", "A1")
+    camera = device_room.DeviceCamera(listed, Mode(), lambda: Controls(1500.0, 2.0))
+    assert (camera.facts.title, camera.facts.serial) == ("HD Webcam", "A1")
+    assert (camera.facts.codec, camera.facts.size_px) == ("mjpeg", (128, 96))
+    assert camera.controls().exposure_us == 1500.0
+    got = []
+    with pytest.raises(OSError, match="no more pictures"):
+        for picture in camera.shots(threading.Event()):
+            got.append(picture)
+    camera.close()
+    with av.open(str(video)) as container:
+        packets = [(bytes(p), p.pts * 1000) for p in container.demux(video=0) if p.size]
+    assert [(s.data, s.device_ns) for s in got] == packets
+
+
+def test_a_device_that_does_not_open_or_codes_otherwise_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setitem(device_room.STAMP_KINDS, "mp4", "kernel")
+    gone = Listed("mp4", str(tmp_path / "gone.mp4"), "HD Webcam")
+    with pytest.raises(InputError, match="does not open with 1280 x 720 at 30 frames/s"):
+        device_room.DeviceCamera(gone, Mode((1280, 720), 30.0), Controls)
+    coded = Listed("mp4", str(make_video(tmp_path / "h264.mp4", "libx264")), "HD Webcam")
+    with pytest.raises(InputError, match="h264"):
+        device_room.DeviceCamera(coded, Mode(), Controls)
 
 
 class FakeDriver:

@@ -130,6 +130,19 @@ def test_a_silent_camera_is_closed_within_a_second_and_goes_on_when_it_comes_bac
     assert without_gaps(numbers(captured.videos["right"]))
 
 
+def test_a_pause_of_our_own_is_not_the_cameras_silence(tmp_path):
+    slept = []
+
+    def watch(state):
+        if state.elapsed_s > 0.2 and not slept:
+            slept.append(time.sleep(1.1))
+
+    with MjpegServer(FAST) as left, MjpegServer(FAST) as right:
+        captured = capture(tmp_path / "T", plan(left, right, seconds=1.6), watch)
+    assert captured.cautions == ()
+    assert without_gaps(numbers(captured.videos["left"]))
+
+
 def test_a_camera_that_is_plugged_in_again_is_found_again(tmp_path):
     address = {}
     with MjpegServer(FAST) as right:
