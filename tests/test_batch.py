@@ -1,6 +1,5 @@
 """What a batch is made of: finding trials, time left, addresses, the result hash."""
 
-import json
 import shutil
 import subprocess
 import sys
@@ -13,13 +12,14 @@ import pytest
 from olivevib import pipeline
 from olivevib.batch import TrialResult, find_trials, measure_on_cluster
 from olivevib.batch.cluster import check_address
-from olivevib.batch.content_hash import result_hash
+from olivevib.batch.contents import read_contents
 from olivevib.batch.find import FILE
 from olivevib.batch.outlook import Outlook
 from olivevib.batch.unit import measure
 from olivevib.errors import Caution, UsageError
 from olivevib.files.store import read_stage, write_stage
 from olivevib.trial import Trial, document
+from olivevib.trial.records.cautions import cautions_text
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +155,7 @@ def test_the_hash_tells_results_not_places(done, tmp_path):
     shutil.copytree(done, copy)
     (copy / "tracks.h5").unlink()  # made anew there
     list(pipeline.run(Trial.open(copy)))
-    assert result_hash(Trial.open(copy)) == result_hash(Trial.open(done))
+    assert read_contents(Trial.open(copy))[0] == read_contents(Trial.open(done))[0]
 
 
 def test_the_hash_does_not_see_where_a_caution_names_the_trial(done, tmp_path):
@@ -163,19 +163,19 @@ def test_the_hash_does_not_see_where_a_caution_names_the_trial(done, tmp_path):
     for name in ("a", "Ö"):
         copy = tmp_path / name
         shutil.copytree(done, copy)
-        text = json.dumps([["video-truncated", f"{copy}/left.nut ends early", ""]])
+        text = cautions_text((Caution("video-truncated", f"{copy}/left.nut ends early", ""),))
         rewrite(copy, cautions=text)
-        found.add(result_hash(Trial.open(copy)))
+        found.add(read_contents(Trial.open(copy))[0])
     assert len(found) == 1
-    assert found != {result_hash(Trial.open(done))}
+    assert found != {read_contents(Trial.open(done))[0]}
 
 
 def test_the_hash_sees_one_changed_bit(done, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(done, copy)
-    before = result_hash(Trial.open(copy))
+    before = read_contents(Trial.open(copy))[0]
     rewrite(copy, nudge=True)
-    assert result_hash(Trial.open(copy)) != before
+    assert read_contents(Trial.open(copy))[0] != before
 
 
 def rewrite(trial: Path, cautions: str = "", nudge: bool = False) -> None:
@@ -203,7 +203,10 @@ def test_a_report_is_made_once_for_the_same_results(done, tmp_path):
     first = measure(copy)
     assert (first.ran, first.failed) == (("report",), False)
     assert [c.code for c in first.cautions] == ["offset-unknown"]
+    assert list(first.cautions) == list(Trial.open(copy).cautions)
     assert measure(copy) == TrialResult(first.folder, first.hash, (), first.cautions)
+    (copy / ".olivevib" / "batch.json").write_text("{}")
+    assert measure(copy) == first
     (copy / "report.html").write_text("changed by hand")
     assert measure(copy).ran == ("report",)
     Trial.open(copy).changed({"tree.cultivar": "Frantoio"})

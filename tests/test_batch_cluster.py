@@ -10,7 +10,7 @@ import pytest
 
 from olivevib import pipeline
 from olivevib.batch import measure_here, measure_on_cluster
-from olivevib.batch.content_hash import result_hash
+from olivevib.batch.contents import read_contents
 from olivevib.errors import InputError, UsageError
 from olivevib.progress import Cancelled
 from olivevib.trial import Trial
@@ -32,7 +32,7 @@ def fresh(tmp_path_factory) -> Path:
 def truth(fresh, tmp_path_factory) -> str:
     (folder,) = batch_trials.season(tmp_path_factory.mktemp("done"), fresh, 1)
     list(pipeline.run(Trial.open(folder)))
-    return result_hash(Trial.open(folder))
+    return read_contents(Trial.open(folder))[0]
 
 
 @pytest.fixture(scope="module")

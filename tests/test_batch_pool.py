@@ -9,7 +9,7 @@ import pytest
 
 from olivevib import pipeline
 from olivevib.batch import measure_here
-from olivevib.batch.content_hash import result_hash
+from olivevib.batch.contents import read_contents
 from olivevib.cli import main
 from olivevib.errors import InputError, UsageError
 from olivevib.files.lock import alone_in
@@ -36,7 +36,7 @@ def done(fresh, tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def truth(done) -> str:
-    return result_hash(Trial.open(done))
+    return read_contents(Trial.open(done))[0]
 
 
 def test_one_worker_two_workers_and_no_worker_measure_the_same(fresh, truth, tmp_path):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 
 from olivevib import __version__, pipeline
-from olivevib.batch.content_hash import result_hash
+from olivevib.batch.contents import read_contents
 from olivevib.batch.result import TrialResult
 from olivevib.errors import InputError, OlivevibError
 from olivevib.files.atomic import write_text_atomic
@@ -20,6 +21,8 @@ from olivevib.trial.document import FILE
 from olivevib.trial.fingerprints import RIG
 
 PAGE = "report.html"
+NOTE = "batch.json"  # derived, in .olivevib/
+SCHEME = 1  # of the result hash
 
 
 def use_one_core() -> None:
@@ -48,37 +51,44 @@ def measure(folder: Path, tick: Tick = silent) -> TrialResult:
 def _measure(trial: Trial, tick: Tick) -> TrialResult:
     ran = [o.stage for o in pipeline.run(trial, tick) if o.words == "done"]
     trial = trial.reopen()
-    if _report(trial, tick):
-        ran.append("report")
-    return TrialResult(str(trial.folder), result_hash(trial), tuple(ran), trial.cautions)
-
-
-def _report(trial: Trial, tick: Tick) -> bool:
-    """Write report.html unless it is there and was made of exactly these results."""
-    page, note = trial.folder / PAGE, trial.private / "report.json"
     made_of = _made_of(trial.folder)
-    if page.exists() and _read(note) == {"of": made_of, "page": sha256_file(page)}:
-        return False
+    known = _known(trial, made_of)
+    if known is None:
+        known = _conclude(trial, made_of, tick)
+        ran.append("report")
+    return replace(known, folder=str(trial.folder), ran=tuple(ran))
+
+
+def _conclude(trial: Trial, made_of: str, tick: Tick) -> TrialResult:
+    """Write the report, hash the results, and note both for the next batch."""
     for _ in pipeline.report([trial], None, tick):
         pass
+    sha256, cautions = read_contents(trial)
+    result = TrialResult(str(trial.folder), sha256, (), cautions)
+    page = sha256_file(trial.folder / PAGE)
     trial.private.mkdir(exist_ok=True)
-    write_text_atomic(note, json.dumps({"of": made_of, "page": sha256_file(page)}))
-    return True
+    note = {"of": made_of, "page": page, "result": result.to_json()}
+    write_text_atomic(trial.private / NOTE, json.dumps(note))
+    return result
+
+
+def _known(trial: Trial, made_of: str) -> TrialResult | None:
+    """What the last batch noted, if results and report are still exactly those."""
+    try:
+        note = json.loads((trial.private / NOTE).read_text(encoding="utf-8"))
+        if note["of"] == made_of and note["page"] == sha256_file(trial.folder / PAGE):
+            return TrialResult.from_json(note["result"])
+    except (OSError, ValueError, TypeError, KeyError, InputError):
+        return None  # no note, no report, or a damaged note: made anew
+    return None
 
 
 def _made_of(folder: Path) -> str:
-    """SHA-256 of all that a report shows: what was typed, what was measured, the version."""
+    """SHA-256 of all that report and hash are made of: what was typed and measured, the version."""
     names = [FILE, RIG, *(stage.file for stage in STAGES)]
     there = {n: sha256_file(folder / n) for n in names if (folder / n).exists()}
-    facts = json.dumps([folder.name, __version__, there])
+    facts = json.dumps([SCHEME, folder.name, __version__, there])
     return hashlib.sha256(facts.encode()).hexdigest()
-
-
-def _read(note: Path) -> object:
-    try:
-        return json.loads(note.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
 
 
 def _out_of_memory(folder: Path) -> InputError:

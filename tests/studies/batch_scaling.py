@@ -19,6 +19,7 @@ from pathlib import Path
 
 import batch_trials
 
+from olivevib.batch.unit import NOTE
 from olivevib.trial.fingerprints import PRIVATE
 
 BATCH = (sys.executable, "-m", "olivevib", "batch", "-q", "--json")
@@ -96,7 +97,7 @@ def resumed(place: Path, count: int, kills: int) -> None:
 
 
 def finished(trials: list[Path]) -> int:
-    return sum((trial / PRIVATE / "report.json").exists() for trial in trials)
+    return sum((trial / PRIVATE / NOTE).exists() for trial in trials)
 
 
 def begun(trials: list[Path]) -> int:

@@ -11,28 +11,32 @@ import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from olivevib.errors import Caution
 from olivevib.files.store import StageFile, Variable, read_stage
-from olivevib.trial import STAGES, Condition
+from olivevib.trial import STAGES, Condition, Trial
 from olivevib.trial.fingerprints import RIG
-
-if TYPE_CHECKING:
-    from olivevib.trial import Trial
+from olivevib.trial.records.cautions import cautions_from
 
 
-def result_hash(trial: Trial) -> str:
-    """SHA-256 of the trial's results, 64 hex digits; InputError where a stage file is damaged."""
+def read_contents(trial: Trial) -> tuple[str, tuple[Caution, ...]]:
+    """SHA-256 of the trial's results (64 hex digits) and its warnings, in order, each once.
+
+    Raises InputError where a stage file is damaged.
+    """
     digest = hashlib.sha256()
+    cautions: dict[Caution, None] = {}
     states = trial.states()
     for stage in STAGES:
         if states[stage.name].state is Condition.DONE:
-            for part in _parts(read_stage(trial.folder / stage.file, stage.name), trial.folder):
+            file = read_stage(trial.folder / stage.file, stage.name)
+            cautions |= dict.fromkeys(cautions_from(file.attributes.get("cautions")))
+            for part in _parts(file, trial.folder):
                 digest.update(len(part).to_bytes(8, "big") + part)
     rig = trial.folder / RIG
     if rig.exists():
         digest.update(rig.read_bytes())
-    return digest.hexdigest()
+    return digest.hexdigest(), tuple(cautions)
 
 
 def _parts(file: StageFile, folder: Path) -> Iterator[bytes]:
