@@ -9,6 +9,7 @@ import argparse
 import json
 import os
 import random
+import resource
 import shutil
 import statistics
 import subprocess
@@ -57,11 +58,14 @@ def gained(place: Path) -> None:
     """Two workers against one, alternating, so that both see the same machine."""
     trial = batch_trials.one(place / "long", LONG_FRAMES)
     seconds: dict[int, list[float]] = {1: [], 2: []}
+    work: dict[int, list[float]] = {1: [], 2: []}
     found = set()
     for _ in range(ROUNDS):
         for workers, times in seconds.items():
             batch_trials.season(place / "gained", trial, 8)
+            before = cpu_s()
             batch, rows = run(place / "gained", workers)
+            work[workers].append(round(cpu_s() - before, 1))
             times.append(round(batch.seconds, 1))
             found |= {row["hash"] for row in rows}
             shutil.rmtree(place / "gained")
@@ -69,6 +73,8 @@ def gained(place: Path) -> None:
     words = " / ".join(f"{ratio:.2f}" for ratio in ratios)
     print(f"two workers against one, 8 trials: {words} (median {statistics.median(ratios):.2f})")
     print(f"  seconds with one {seconds[1]}, with two {seconds[2]}; {len(found)} result hash")
+    idle = 2 * statistics.median(work[1]) / statistics.median(work[2])
+    print(f"  processor seconds {work[1]} and {work[2]}: {idle:.2f} where nobody else needs a core")
 
 
 def resumed(place: Path, count: int, kills: int) -> None:
@@ -143,6 +149,12 @@ def run(folder: Path, workers: int) -> tuple[Watched, list[dict]]:
     """A batch from start to end."""
     batch = Watched(folder, workers)
     return batch, batch.rows()
+
+
+def cpu_s() -> float:
+    """Processor time of all processes that were started here and have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def children(parent: int) -> list[int]:
