@@ -108,7 +108,11 @@ def record(rig, rng, what=Recording(), board=None, motion=None):
         px_all = see(rig, right, motion, board, what, t)
         for k in range(stamps.size):
             px = px_all[k] + what.noise_px * rng.standard_normal((len(board), 2))
-            ok = np.isfinite(px).all(axis=1) & (px > 3).all(axis=1) & (px < np.array(SIZE) - 4).all(axis=1)
+            ok = (
+                np.isfinite(px).all(axis=1)
+                & (px > 3).all(axis=1)
+                & (px < np.array(SIZE) - 4).all(axis=1)
+            )
             ok &= rng.random(len(board)) >= what.missing
             if ok.sum() >= 6:
                 stamp = float("nan") if what.stills else stamps[k]

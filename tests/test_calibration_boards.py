@@ -67,7 +67,10 @@ def test_points_are_frozen():
         ("charuco:2x5,square=54,marker=40,dict=DICT_4X4_50", ["3 to 100"]),
         ("charuco:4x5,square=-1,marker=nan,dict=DICT_4X4_50", ["square", "marker"]),
         ("charuco:4x5,square=a,square=5,marker=4,dict=DICT_4X4_50", ["square is given twice"]),
-        ("charuco:4x5,square=54,marker=40,dict=DICT_4X4_50,inverted=1", ["inverted takes no value"]),
+        (
+            "charuco:4x5,square=54,marker=40,dict=DICT_4X4_50,inverted=1",
+            ["inverted takes no value"],
+        ),
         ("arucogrid:5x7,size=40,dict=DICT_6X6_250", ["gap (mm) is missing"]),
         ("arucogrid:5x7,size=40,gap=10,dict=DICT_6X6_250,legacy", ["legacy is no key"]),
         ("chessboard:9x6,square=25,dict=DICT_4X4_50", ["dict is no key"]),

@@ -152,7 +152,7 @@ class Markers:
 
 def test_coded_boards_take_any_reader():
     board = parse_board("coded:3x2,pitch=60,size=44,first=11")
-    centres = [(11 + k, np.array([10.0 * k, 50.0 + 7 * (k // 3) * k]), ()) for k in range(6)]
+    centres = [(11 + k, np.array([30.0 * (k % 3), 50.0 + 28 * (k // 3)]), ()) for k in range(6)]
     others = [(4, np.zeros(2), ()), (17, np.ones(2), ())]
     finder = BoardFinder(board, Markers([*centres, *others]))
     view = finder.find(np.zeros((100, 100), np.uint8), 9, 1.5)

@@ -51,13 +51,13 @@ class Artwork:
         """Grey 0...1 and its slopes by x and y (H, W, 3) at a level of blur."""
         if level not in self._drawn:
             drawn = blurred_squares(self._squares, self._size, float(BLURS[level]))
-            ink = -self._sign * drawn
-            ink[:, :, 0] += self._sign > 0
-            self._drawn[level] = ink.astype(np.float32)
+            ink = np.float32(-self._sign) * drawn
+            ink[:, :, 0] += np.float32(self._sign > 0)
+            self._drawn[level] = ink
         return self._drawn[level]
 
 
-def blurred_squares(squares: Floats, size_px: Ints, sigma_px: float) -> Floats:
+def blurred_squares(squares: Floats, size_px: Ints, sigma_px: float) -> Image:
     """Squares x0 y0 x1 y1 (S, 4) px of darkness 1 under a Gaussian blur, exact at pixel centres.
 
     Returns darkness and its derivatives by x and y (H, W, 3); size (W, H). Nothing is drawn on
@@ -70,10 +70,11 @@ def blurred_squares(squares: Floats, size_px: Ints, sigma_px: float) -> Floats:
         centre = np.arange(n) + 0.5
         low, high = ((centre - squares[:, j, None]) / sigma_px for j in (k, k + 2))
         bell = np.exp(-0.5 * low**2) - np.exp(-0.5 * high**2)
-        sides.append((ndtr(low) - ndtr(high), bell / (np.sqrt(2 * np.pi) * sigma_px)))
+        shade, slope = ndtr(low) - ndtr(high), bell / (np.sqrt(2 * np.pi) * sigma_px)
+        sides.append((shade.astype(np.float32), slope.astype(np.float32)))
     (across, slope_x), (down, slope_y) = sides
     layers = [down.T @ across, down.T @ slope_x, slope_y.T @ across]
-    return np.asarray(np.stack(layers, axis=2), dtype=np.float64)
+    return np.asarray(np.stack(layers, axis=2), dtype=np.float32)
 
 
 def _reach(board: Board) -> Floats:

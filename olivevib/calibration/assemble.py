@@ -9,7 +9,7 @@ import numpy as np
 
 from olivevib.arrays import Floats, Ints
 from olivevib.calibration.bundle import LEFT, RIGHT, RIGHT_ALONE, Observations
-from olivevib.calibration.tracks import ORDERS, Samples, motion_at, shifted, tabulate
+from olivevib.calibration.tracks import ORDERS, Samples, at_rest, motion_at, shifted, tabulate
 from olivevib.calibration.views import BoardView, pair_views, times
 from olivevib.geometry import CameraModel
 
@@ -100,6 +100,7 @@ def flatten(side: Side, pick: Ints, chain: int, poses: Ints, shape: BoardShape) 
     track[:, 0] = table.px
     if side.timed and views:
         local = motion_at(side.samples(), table.id, times(views)[table.view])
+        local.coefficients[at_rest(local, table.view), 1:] = 0.0
         track[local.ok] = local.coefficients[local.ok]
     return _observations(side, shape, chain, poses[table.view], table, track)
 
@@ -187,6 +188,7 @@ def _tracked(
     ids, first = np.unique(points.id, return_index=True)
     pose = np.repeat(np.arange(n), ids.size)
     local = motion_at(samples, np.tile(ids, n), (stamps + lag_s)[pose])
+    local.coefficients[at_rest(local, pose), 1:] = 0.0
     enough = np.bincount(pose, local.ok, n) >= LEAST_POINTS
     keep = local.ok & enough[pose]
     px = local.coefficients[keep, 0]

@@ -24,6 +24,7 @@ FIRST_BLUR_PX = 0.8  # Gaussian blur of a camera to begin with; one is chosen a 
 MOST_PIXELS = 12_000  # of one view; larger patches are cut down, but not below the next
 LEAST_PER_POINT = 400
 FLOOR_PX = 0.02  # what no template knows: sharpening, compression, print
+STILL_PX = 5e-3  # a step below this is the last
 LEAST_PIXELS = 25  # of a patch
 LEAST_NCC = 0.75
 LEAST_GAIN = 10.0  # grey levels between white and black
@@ -54,6 +55,13 @@ class _Patches:
     def count(self) -> Floats:
         """Pixels (N,) of each patch."""
         return np.diff(np.append(self.start, self.point.size)).astype(np.float64)
+
+    def thinned(self, step: int) -> _Patches:
+        """Every ``step``-th pixel."""
+        point = self.point[::step]
+        start = np.searchsorted(point, np.arange(self.start.size))
+        rest = (self.grey, self.board_mm, self.local, self.by_px)
+        return _Patches(start, point, *(part[::step] for part in rest))
 
     def sums(self, columns: Floats) -> Floats:
         """Sums (N, C) over the pixels of each point of ``columns`` (M, C)."""
@@ -186,17 +194,17 @@ def _sample(layer: Image, px: Image) -> Floats:
 def _rough(artwork: Artwork, patches: _Patches, scale: float) -> _Descent:
     """A few steps at a middle blur; ``scale``: template pixels an image pixel."""
     layer = artwork.layer(artwork.level(FIRST_BLUR_PX * scale))
-    return _descend(artwork, patches, layer, np.zeros((patches.start.size, 2)), 4)
+    return _descend(artwork, patches, layer, np.zeros((patches.start.size, 2)), 3)
 
 
 def _fine(artwork: Artwork, patches: _Patches, scale: float) -> _Descent:
     """All steps at the blur that leaves the least residual, found by walking up or down."""
-    zero = np.zeros((patches.start.size, 2))
+    zero, some = np.zeros((patches.start.size, 2)), patches.thinned(3)
     rests: dict[int, float] = {}
 
     def rest(level: int) -> float:
         if level not in rests:
-            rests[level] = _rest(artwork, patches, artwork.layer(level), zero)
+            rests[level] = _rest(artwork, some, artwork.layer(level), zero)
         return rests[level]
 
     level = artwork.level(FIRST_BLUR_PX * scale)
@@ -291,7 +299,9 @@ def _descend(
     """Gauss-Newton with Tukey weights; at most ``steps`` steps, or until nothing moves."""
     drawn = _drawn(artwork, patches, layer, move)
     light = _light(patches, drawn)
-    for _ in range(steps):
+    for k in range(steps):
+        if k:
+            drawn = _drawn(artwork, patches, layer, move)
         residual = _left_over(patches, drawn, light)
         limit = np.maximum(0.36 * np.abs(light[:, 0]), 3.9 * _rms(patches, residual))
         weight = np.clip(1 - (residual / limit[patches.point]) ** 2, 0, None) ** 2
@@ -301,8 +311,7 @@ def _descend(
         length = np.linalg.norm(step[:, :2], axis=1)
         move = move + step[:, :2] * np.minimum(1, 1.5 / np.maximum(length, 1e-9))[:, None]
         light = light + step[:, 2:]
-        drawn = _drawn(artwork, patches, layer, move)
-        if length.max() < 4e-3:
+        if length.max() < STILL_PX:
             break
     total = patches.sums(weight[:, None])[:, 0]
     variance = gram[:, 8, 8] / np.maximum(total - 8, 1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from olivevib.arrays import Grey
@@ -89,7 +90,8 @@ def diagnose(
     """
     attempts: list[Attempt] = []
     steps = len(_LOOKS) + 2
-    for k, (cause, what, look) in enumerate(_LOOKS):
+    looks = _LOOKS[:1] if board.kind == "chessboard" else _LOOKS  # it looks the same in all
+    for k, (cause, what, look) in enumerate(looks):
         tick(k, steps, what)
         views = _views(board, frames, look, reader)
         attempts.append(Attempt(what, len(views), len(frames)))
@@ -273,31 +275,39 @@ def _other_ids(
 def _other_corners(
     board: Board, frames: Sequence[Grey], attempts: list[Attempt]
 ) -> Diagnosis | None:
-    """Chessboards: squares counted instead of inner corners, or columns and rows exchanged."""
-    c, r = board.columns, board.rows
-    sizes = [(r, c), (c - 1, r - 1), (r - 1, c - 1), (c - 1, r), (c, r - 1), (c + 1, r), (c, r + 1)]
-    best: tuple[Board, int] | None = None
-    for columns, rows in sizes:
-        if min(columns, rows) >= 3 and (columns, rows) != (c, r):
-            trial = replace(board, columns=columns, rows=rows)
-            count = len(_views(trial, frames, as_is, None))
-            if count > (best[1] if best else 0):
-                best = (trial, count)
-    attempts.append(Attempt("other columns and rows", best[1] if best else 0, len(frames)))
-    if best is None or best[1] < max(1, ENOUGH * len(frames)):
+    """Chessboards of any size: whatever the finder of growing boards reads in most frames."""
+    sizes = [size for grey in frames if (size := _chessboard_size(grey)) is not None]
+    most = max(set(sizes), key=sizes.count) if sizes else (0, 0)
+    count = sizes.count(most)
+    attempts.append(Attempt("other columns and rows", count, len(frames)))
+    if count < max(1, ENOUGH * len(frames)):
         return None
+    columns, rows = most if board.columns >= board.rows else most[::-1]
+    works = replace(board, columns=columns, rows=rows)
     return Diagnosis(
         "wrong-counts",
-        f"The board has {best[0].columns}x{best[0].rows} inner corners, not {c}x{r}: found so in "
-        f"{best[1]} of {len(frames)} frames.",
-        f"Use --board {best[0].spec}",
-        best[0],
+        f"The board has {columns}x{rows} inner corners, not {board.columns}x{board.rows}: found "
+        f"so in {count} of {len(frames)} frames.",
+        f"Use --board {works.spec}",
+        works,
         tuple(attempts),
     )
 
 
+def _chessboard_size(grey: Grey) -> tuple[int, int] | None:
+    """Inner corners of the largest chessboard in an image, the larger count first."""
+    flags = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
+    found, _, cells = cv2.findChessboardCornersSBWithMeta(grey, (3, 3), flags)
+    if not found:
+        return None
+    rows, columns = np.asarray(cells).shape[:2]
+    return max(rows, columns), min(rows, columns)
+
+
 def _nothing(board: Board, frames: Sequence[Grey], attempts: list[Attempt]) -> Diagnosis:
     tried = ", ".join(attempt.what for attempt in attempts[1:])
+    if board.kind == "chessboard":
+        tried += " (inverted, mirrored or turned it would be found as well)"
     bright = float(np.median([np.quantile(grey, 0.95) for grey in frames])) if frames else 0.0
     hint = " The pictures are very dark." if bright < 60 else ""
     return Diagnosis(

@@ -14,10 +14,12 @@ from olivevib.calibration.artwork import Artwork, charuco_board
 from olivevib.calibration.boards import CORNERS_PER_MARKER, Board, markers_on, predefined
 from olivevib.calibration.corners import refine
 from olivevib.calibration.views import BoardView
-from olivevib.calibration.warp import bent_warp
+from olivevib.calibration.warp import bent_warp, robust_homography
 from olivevib.detection.detection import Reader
+from olivevib.geometry import apply_homography
 
 LEAST_POINTS = 4
+ASTRAY = 0.15  # of the pitch: no lens bends a board by as much
 PREDICT_FROM = 6  # points that predict where the missing ones are
 UNREFINED_PX = 0.15  # what OpenCV's corners are worth where the print does not fit
 LARGE_PX = 1.1e6  # above this many pixels the sector-based chessboard finder is better
@@ -47,7 +49,7 @@ class BoardFinder:
         if self._reader is not None:
             return _coded_view(self.board, self._reader, grey, frame, t_s)
         raw = self._search(255 - grey if self.board.inverted else grey)
-        if raw is None or not _spread(self.board, raw[0]):
+        if raw is None or not _spread(self.board, raw[0]) or not _flat(self.board, *raw):
             return None
         assert self._artwork is not None
         ids, px, sigma = refined(self.board, self._artwork, grey, raw)
@@ -99,6 +101,17 @@ def _spread(board: Board, ids: Ints) -> bool:
     points = board.points_mm[ids, :2]
     s = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return bool(s[1] > 0.2 * board.pitch_mm)
+
+
+def _flat(board: Board, ids: Ints, px: Floats) -> bool:
+    """Whether the points lie as on this board: wrong columns or a mirror put them elsewhere."""
+    plane = board.points_mm[ids, :2]
+    try:
+        back = np.asarray(np.linalg.inv(robust_homography(plane, px)), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return False
+    miss = np.linalg.norm(apply_homography(back, px) - plane, axis=1)
+    return bool(np.mean(miss < ASTRAY * board.pitch_mm) >= 0.8)
 
 
 def _charuco_search(board: Board) -> Callable[[Grey], Raw | None]:
@@ -198,8 +211,8 @@ def _coded_view(
     count = markers_on(board.kind, board.columns, board.rows)
     seen = {d.id - board.first: d for d in reader.detect(grey) if not d.flags}
     ids = np.array(sorted(k for k in seen if 0 <= k < count), dtype=np.int64)
-    if not _spread(board, ids):
+    px = np.array([seen[int(k)].centre_px for k in ids]).reshape(-1, 2)
+    if not _spread(board, ids) or not _flat(board, ids, px):
         return None
     sigma = [np.sqrt(max(np.trace(seen[int(k)].centre_cov_px2) / 2, 1e-6)) for k in ids]
-    px = np.array([seen[int(k)].centre_px for k in ids])
     return BoardView(frame, t_s, ids, px, board.points_mm[ids], np.array(sigma))

@@ -10,7 +10,7 @@ import numpy as np
 from olivevib.arrays import Bools, Floats
 from olivevib.calibration.assemble import Assembly, BoardShape, Side, assemble, shape_of, table_of
 from olivevib.calibration.bundle import BOW, LAG, LENS_OF, POSE, ROW_OF, THETA, State
-from olivevib.calibration.lag import LeftPoints, Pose, medoid_pose, search_lag
+from olivevib.calibration.lag import LeftPoints, Pose, agreement, medoid_pose, search_lag
 from olivevib.calibration.lens import LensFit, fit_lens, lens_prior, mono_prior
 from olivevib.calibration.settings import CalibrationSettings
 from olivevib.calibration.solve import Prior, Problem, Solution, grams, solve
@@ -49,7 +49,8 @@ class JointFit:
 
     made: observations and which board pose each view shows; lenses: the fits of single cameras;
     lag_free: whether the lag was estimated; lag_rms (L, 2): lags that were searched, s, and the rms
-    there, px; jitter_sd_s: scatter of single views about the lag.
+    there, px; jitter_sd_s: scatter of single views about the lag; agreement: share of the common
+    views in which both cameras, each alone, tell the same stereo rotation.
     """
 
     pair: Pair
@@ -60,6 +61,7 @@ class JointFit:
     lag_free: bool
     lag_rms: Floats
     jitter_sd_s: float
+    agreement: float
 
     @property
     def state(self) -> State:
@@ -142,7 +144,8 @@ def fit_joint(
     """Refine everything together, the corner tracks renewed until lag and jitter stand still."""
     a, b = (side.with_scale(fit.scale) for side, fit in zip(pair.sides, lenses, strict=True))
     pair = replace(pair, left=a, right=b)
-    start, lag, lag_rms = start_pose(pair, settings, lenses)
+    start = start_pose(pair, settings, lenses)
+    lag = start.lag_s
     free, prior = unknowns(pair, settings), joint_prior(pair, settings)
     jitter = FIRST_JITTER_S if free[LAG] else 0.0
     state: State | None = None
@@ -150,7 +153,7 @@ def fit_joint(
     for _ in range(6):
         made = assemble(pair.left, pair.right, pair.shape, lags)
         problem = Problem(made.observations, prior, free, settings.huber, jitter)
-        state = reposed(state or initial(lenses, start, lag), made, lenses)
+        state = reposed(state or initial(lenses, start), made, lenses)
         solution = solve(problem, state, tick=tick)
         state = solution.state
         moved = float(np.abs(state.lag_s + state.jitter_s[: lags.size] - lags).max())
@@ -161,7 +164,19 @@ def fit_joint(
         pair = with_row_times(pair, state)
         if moved < 2e-4 and abs(jitter / before - 1) < 0.1:
             break
-    return JointFit(pair, made, problem, solution, lenses, bool(free[LAG]), lag_rms, jitter)
+    lag_free = bool(free[LAG])
+    rest = (lag_free, start.lag_rms, jitter, start.agreement)
+    return JointFit(pair, made, problem, solution, lenses, *rest)
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where the joint solve begins: stereo pose, lag, what the search saw, how well they agree."""
+
+    pose: Pose
+    lag_s: float
+    lag_rms: Floats
+    agreement: float
 
 
 def with_row_times(pair: Pair, state: State) -> Pair:
@@ -188,16 +203,15 @@ def jitter_sd(problem: Problem, state: State) -> float:
     return max(float(np.sqrt((state.jitter_s**2).sum() / known.sum())), LEAST_JITTER_S)
 
 
-def start_pose(
-    pair: Pair, settings: CalibrationSettings, lenses: tuple[LensFit, LensFit]
-) -> tuple[Pose, float, Floats]:
+def start_pose(pair: Pair, settings: CalibrationSettings, lenses: tuple[LensFit, LensFit]) -> Start:
     """Stereo pose and lag to begin with, from the poses that each camera found alone."""
     left, right = lenses[0].solution.state, lenses[1].solution.state
     pairs = pair_views(pair.left.views, pair.right.views)
     a, b = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
     pose = medoid_pose(left.R_pose[a], left.t_pose_mm[a], right.R_pose[b], right.t_pose_mm[b])
+    share = agreement(left.R_pose[a], right.R_pose[b], pose.R)
     if not (pair.timed and settings.estimate_lag):
-        return pose, 0.0, np.zeros((0, 2))
+        return Start(pose, 0.0, np.zeros((0, 2)), share)
     samples, points = pair.right.samples(), left_points(pair, left)
     reach, camera = settings.lag_range_s, lenses[1].camera
     while True:
@@ -206,7 +220,7 @@ def start_pose(
         lags = np.asarray(step * np.arange(-count, count + 1), dtype=np.float64)
         lag, found, rms = search_lag(points, samples, camera, pose, lags)
         if abs(lag) < reach - 1.5 * step or reach >= WIDEST_LAG_S:
-            return found, lag, np.column_stack([lags, rms])
+            return Start(found, lag, np.column_stack([lags, rms]), share)
         reach *= 2  # the best lag lies at the edge: look further
 
 
@@ -218,15 +232,15 @@ def left_points(pair: Pair, left: State) -> LeftPoints:
     return LeftPoints(xyz + left.t_pose_mm[table.view], table.id, stamps[table.view])
 
 
-def initial(lenses: tuple[LensFit, LensFit], start: Pose, lag: float) -> State:
+def initial(lenses: tuple[LensFit, LensFit], start: Start) -> State:
     """The joint state that the single cameras and the lag search suggest; poses of the left."""
     left, right = lenses[0].solution.state, lenses[1].solution.state
     return replace(
         left,
         right=right.left,
-        R=start.R,
-        t_mm=start.t_mm,
-        lag_s=lag,
+        R=start.pose.R,
+        t_mm=start.pose.t_mm,
+        lag_s=start.lag_s,
         bow_mm=(left.bow_mm + right.bow_mm) / 2,
         row_time_s=np.array([left.row_time_s[0], right.row_time_s[0]]),
     )

@@ -19,6 +19,13 @@ class Pose:
     t_mm: Floats
 
 
+def agreement(R_left: Floats, R_right: Floats, R: Floats) -> float:
+    """Share of the views (V, 3, 3) whose stereo rotation is within 10 degrees of ``R``."""
+    each = R_right @ R_left.transpose(0, 2, 1)
+    trace = np.einsum("aij,ij->a", each, R)
+    return float((trace > 1 + 2 * np.cos(np.radians(10.0))).mean())
+
+
 @dataclass(frozen=True)
 class LeftPoints:
     """Board points in the left camera's frame (N, 3) mm, with id (N,) and instant (N,) s."""

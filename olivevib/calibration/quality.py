@@ -78,10 +78,12 @@ def cautions(evidence: Evidence) -> tuple[Caution, ...]:
 
 def _disagree(e: Evidence) -> Iterator[Caution]:
     together, alone = max(e.rms_px), max(*e.alone_rms_px, 0.2)
-    if together > 4 * alone:
+    if together > 4 * alone or e.fit.agreement < 0.5:
         yield Caution(
             "cameras-disagree",
-            f"Each camera alone fits to {alone:.2f} px, both together only to {together:.2f} px.",
+            f"The two cameras tell different stories: alone each fits to {alone:.2f} px, but only "
+            f"{100 * e.fit.agreement:.0f} % of the common views give the same position of one "
+            f"camera to the other, and together they fit to {together:.2f} px.",
             "Check that both recordings show the same board at the same time, that neither is "
             "mirrored, and that no camera moved; then record again.",
         )

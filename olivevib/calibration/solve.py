@@ -166,7 +166,7 @@ def reduce(problem: Problem, state: State, gram: Floats, damping: float = 0.0) -
     """Eliminate each view's pose from its Gram matrix."""
     U, W, C = gram[:, :POSE, :POSE], gram[:, :POSE, POSE:], gram[:, POSE:-1, POSE:]
     diagonal = np.einsum("vii->vi", U)
-    floor = 1e-12 * diagonal[:, :6].max(axis=1, keepdims=True) + 1e-12
+    floor = 1e-13 * diagonal + np.where(diagonal > 0, 0.0, 1.0)  # poses that nobody sees
     U = U + np.eye(POSE) * (damping * diagonal + floor)[:, None, :]
     solved = np.linalg.solve(U, W)
     left = C - W[:, :, :-1].transpose(0, 2, 1) @ solved

@@ -32,12 +32,14 @@ class Local:
     """A point's motion about a query instant: px(dt) = sum coefficient_k dt^k, dt in s.
 
     ok (Q,): whether the instant lies within half a period of samples that are close enough;
-    coefficients (Q, 6, 2) px/s^k; sigma_px (Q,) with the error of the interpolation.
+    coefficients (Q, 6, 2) px/s^k; sigma_px (Q,) with the error of the interpolation;
+    velocity_sigma (Q,) px/s of each axis.
     """
 
     ok: Bools
     coefficients: Floats
     sigma_px: Floats
+    velocity_sigma: Floats
 
     @property
     def velocity(self) -> Floats:
@@ -69,10 +71,11 @@ def motion_at(samples: Samples, ids: Ints, t_s: Floats) -> Local:
     nodes, px = samples.t_s[index] - t_s[:, None], samples.px[index]
     coefficients = np.zeros((ids.size, ORDERS[-1], 2))
     error, usable = np.zeros(ids.size), np.zeros(ids.size, dtype=np.int64)
+    gain = np.zeros(ids.size)
     for order in ORDERS:
         part = slice(ORDERS[-1] // 2 - order // 2, ORDERS[-1] // 2 + order // 2)
         use = good[:, part].all(axis=1)
-        finer = _interpolate(nodes[use, part], px[use, part])
+        finer, gain[use] = _interpolate(nodes[use, part], px[use, part])
         error[use] = np.linalg.norm(finer[:, 0] - coefficients[use, 0], axis=1)
         coefficients[use] = 0.0
         coefficients[use, :order] = finer
@@ -87,7 +90,7 @@ def motion_at(samples: Samples, ids: Ints, t_s: Floats) -> Local:
     )
     sigma = samples.sigma_px[index]
     noise = np.hypot((1 - share) * sigma[:, middle], share * sigma[:, middle + 1])
-    return Local(usable > 0, coefficients, np.hypot(noise, error))
+    return Local(usable > 0, coefficients, np.hypot(noise, error), gain * sigma[:, middle])
 
 
 def _stencil(samples: Samples, ids: Ints, t_s: Floats) -> tuple[Ints, Bools]:
@@ -120,15 +123,19 @@ def _stencil(samples: Samples, ids: Ints, t_s: Floats) -> tuple[Ints, Bools]:
     return index, good
 
 
-def _interpolate(nodes: Floats, px: Floats) -> Floats:
-    """Polynomial coefficients (Q, m, 2) in s through m samples (Q, m, 2) at ``nodes`` (Q, m)."""
+def _interpolate(nodes: Floats, px: Floats) -> tuple[Floats, Floats]:
+    """Coefficients (Q, m, 2) in s through m samples (Q, m, 2) at ``nodes`` (Q, m).
+
+    And by how much (Q,) the noise of one sample is felt in the velocity, 1/s.
+    """
     unit = np.maximum(np.abs(nodes).max(axis=1, initial=0.0), 1e-9)[:, None]
     powers = np.arange(nodes.shape[1])
     scaled = (nodes / unit)[:, :, None] ** powers
     apart = np.diff(nodes, axis=1).min(axis=1, initial=np.inf) > 1e-4 * unit[:, 0]
     scaled[~apart] = np.eye(nodes.shape[1])
-    out: Floats = np.linalg.solve(scaled, px) / (unit**powers)[:, :, None]
-    return out
+    back = np.linalg.inv(scaled) / (unit**powers)[:, :, None]
+    gain = np.sqrt((back[:, 1] ** 2).sum(axis=1))
+    return np.asarray(back @ px, dtype=np.float64), np.asarray(gain, dtype=np.float64)
 
 
 def polynomial(c: Floats, dt: Floats) -> tuple[Floats, Floats]:
@@ -147,6 +154,18 @@ def shifted(c: Floats, by_s: Floats) -> Floats:
         out[:, 1:] = out[:, :-1] - by[:, None] * out[:, 1:]
         out[:, 0] = c[:, k] - by * out[:, 0]
     return out
+
+
+def at_rest(local: Local, view: Ints) -> Bools:
+    """Points (Q,) of views whose motion cannot be told from the noise of their pixels.
+
+    ``view`` (Q,) numbers the views. Noise taken for motion would pretend to know the lag.
+    """
+    noise = 2 * np.maximum(local.velocity_sigma, 1e-30) ** 2
+    ratio = np.where(local.ok, (local.velocity**2).sum(axis=1) / noise, 0.0)
+    count = np.maximum(np.bincount(view, local.ok), 1)
+    mean = np.bincount(view, ratio) / count
+    return np.asarray((mean < np.maximum(2.0, 1 + 4 / np.sqrt(count)))[view], dtype=np.bool_)
 
 
 def speeds(views: Sequence[BoardView]) -> Floats:

@@ -37,7 +37,7 @@ def uncertainty(problem: Problem, solution: Solution) -> Uncertainty:
     """Both covariances of a solution and the one to publish."""
     gram, _ = grams(problem, solution.state)
     reduced = reduce(problem, solution.state, gram)
-    model = symmetric(np.linalg.inv(reduced.total_H))
+    model = firm_inverse(reduced.total_H)
     used = np.einsum("vii->v", reduced.H) > 0
     H, g = reduced.H[used], reduced.g[used]
     count = max(int(used.sum()), 2)
@@ -49,6 +49,14 @@ def uncertainty(problem: Problem, solution: Solution) -> Uncertainty:
     pull[used] = np.einsum("vi,ij,vj->v", g, model, g)
     full = [_full(problem, matrix) for matrix in (model, cluster, published)]
     return Uncertainty(full[0], full[1], full[2], pull)
+
+
+def firm_inverse(H: Floats) -> Floats:
+    """The inverse of an information matrix (p, p); directions without any get a huge variance."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+    values, vectors = np.linalg.eigh(symmetric(H * np.outer(scale, scale)))
+    inside = vectors / np.maximum(values, 1e-12) @ vectors.T
+    return symmetric(inside * np.outer(scale, scale))
 
 
 def widen(model: Floats, pulls: Floats, prior_matrix: Floats) -> Floats:
