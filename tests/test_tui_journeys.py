@@ -66,6 +66,7 @@ async def test_from_the_list_to_results_report_and_back_by_keys(workspace):
         assert isinstance(app.screen, TrialsPage)
 
 
+@pytest.mark.slow
 async def test_the_report_is_made_and_its_place_shown(workspace):
     async with started(workspace, (80, 24)) as (app, pilot):
         await press(pilot, "enter", "e", "e")
@@ -204,7 +205,7 @@ async def test_markers_are_chosen_by_key_table_mouse_and_palette(workspace):
         assert "▶1 trunk" in screen_text(app)
         await press(pilot, "j", "m", "down", "down")
         assert "▶5 branch" in screen_text(app)
-        await press(pilot, "ctrl+p", *"marker9", "down", "enter")
+        await press(pilot, "ctrl+p", "text:marker9", "down", "enter")
         assert "▶9 twig" in screen_text(app)
         assert "marker 9 twig" in screen_text(app)
 
@@ -281,7 +282,7 @@ async def test_the_comparison_shows_overlay_difference_and_verdict(workspace):
 async def test_a_setting_is_changed_checked_and_makes_stale(workspace):
     folder = workspace / "trials/2026-11-20_T04"
     async with started(workspace) as (app, pilot):
-        await press(pilot, "enter", "s", "ctrl+p", *"setmarkerssize", "down", "enter")
+        await press(pilot, "enter", "s", "ctrl+p", "text:setmarkerssize", "down", "enter")
         field = app.screen.query_one("#value", Input)
         assert field.value == "60.0"
         field.value = "wide"
@@ -296,22 +297,26 @@ async def test_a_setting_is_changed_checked_and_makes_stale(workspace):
         assert "the setting markers.size_mm changed" in screen_text(app)
 
 
+@pytest.mark.slow
 async def test_an_accelerometer_is_bound_to_a_marker(workspace):
     folder = workspace / "trials/2026-11-20_T05"
     async with started(workspace) as (app, pilot):
-        await press(pilot, "down", "enter", "s", "ctrl+p", *"setaccelerometers", "down", "enter")
+        await press(
+            pilot, "down", "enter", "s", "ctrl+p", "text:setaccelerometers", "down", "enter"
+        )
         app.screen.query_one("#value", Input).value = '[{file = "accelerometer.csv", marker = 5}]'
         await press(pilot, "enter", "escape")
         assert [(a.file, a.marker) for a in Trial.open(folder).settings.accelerometers] == [
             ("accelerometer.csv", 5)
         ]
         assert "○ missing" in screen_text(app)
-        await press(pilot, "s", "ctrl+p", *"setaccelerometers", "down", "enter")
+        await press(pilot, "s", "ctrl+p", "text:setaccelerometers", "down", "enter")
         app.screen.query_one("#value", Input).value = ""
         await press(pilot, "enter", "escape")
         assert Trial.open(folder).settings.accelerometers == ()
 
 
+@pytest.mark.slow
 async def test_pictures_show_markers_and_step_through_the_recording(workspace):
     folder = workspace / "trials/2026-11-20_T04"
     make_video(folder / "left.avi", "ffv1", frames=12, size=(640, 480))
@@ -322,7 +327,7 @@ async def test_pictures_show_markers_and_step_through_the_recording(workspace):
         assert "4 markers" in screen_text(app)
         await press(pilot, "right", "right", "left")
         assert "frame 1 of 240" in screen_text(app)
-        await press(pilot, "c")
+        await press(pilot, "o")
         assert "right  frame 1 of 240" in screen_text(app)
         await press(pilot, "right_square_bracket")
         assert "marker 2 seen" in screen_text(app)
@@ -333,6 +338,22 @@ async def test_pictures_show_markers_and_step_through_the_recording(workspace):
             await pilot.pause(0.05)
         await press(pilot, "space")
         assert app.screen._playing is None
+
+
+async def test_markers_are_found_in_one_picture_with_the_parameters_of_now(workspace):
+    folder = workspace / "trials/2026-11-20_T04"
+    for side in ("left", "right"):
+        scene.marker_video(folder / f"{side}.avi", 5)
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "k", "i")
+        assert "1 markers found in this picture alone" in screen_text(app)
+        assert "marker 5 seen" in screen_text(app)
+        trial = Trial.open(folder).changed({"detection.fill": 1.0, "detection.mode": "paper"})
+        assert trial.settings.detection.fill == 1.0
+        await press(pilot, "right", "left")
+        assert "no markers found in this picture alone" in screen_text(app)
+        await press(pilot, "i")
+        assert "4 markers tracked here" in screen_text(app)
 
 
 async def test_a_broken_recording_is_told_where_the_picture_would_be(workspace):
@@ -355,7 +376,7 @@ async def test_a_new_trial_is_made_from_two_recordings_by_keys(workspace, tmp_pa
     async with started(workspace) as (app, pilot):
         await press(pilot, "n")
         assert isinstance(app.screen, NewTrialPage)
-        await press(pilot, *"T07", "enter")
+        await press(pilot, "text:T07", "enter")
         app.screen.query_one("#left", Input).value = str(raw / "left.avi")
         await press(pilot, "enter")
         assert app.screen.query_one("#right", Input).value == str(raw / "right.avi")
@@ -369,9 +390,29 @@ async def test_a_new_trial_is_made_from_two_recordings_by_keys(workspace, tmp_pa
     assert (raw / "left.avi").is_file()
 
 
+async def test_a_new_trial_takes_over_the_settings_of_the_marked_one(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "N")
+        form = {f: app.screen.query_one(f"#{f}", Input).value for f in ("size", "ids", "shutter")}
+        assert form == {"size": "60.0", "ids": "1,2,5,9", "shutter": "global"}
+        assert app.screen.query_one("#rig", Input).value.endswith("2026-11-20_T04/rig.toml")
+        assert app.screen.query_one("#left", Input).value == ""
+
+
+async def test_the_calibration_page_tells_coverage_and_verdict(workspace):
+    async with started(workspace, (80, 24)) as (app, pilot):
+        await press(pilot, "enter", "enter")
+        assert "taken over from shared_rig.toml" in screen_text(app)
+        assert "hardly any upper left" in screen_text(app)
+        await press(pilot, "o")
+        assert "right camera" in screen_text(app)
+        await press(pilot, "escape", "escape", "down", "down", "enter", "b")
+        assert "Not calibrated yet" in screen_text(app)
+
+
 async def test_a_new_trial_that_cannot_be_made_says_why_and_keeps_the_form(workspace):
     async with started(workspace) as (app, pilot):
-        await press(pilot, "n", *"T07", "ctrl+s")
+        await press(pilot, "n", "text:T07", "ctrl+s")
         assert isinstance(app.screen, ErrorScreen)
         assert "left recording is not named" in screen_text(app)
         await press(pilot, "escape")
@@ -405,9 +446,10 @@ async def test_an_empty_folder_says_what_to_do_first(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 async def test_help_footer_and_palette_on_every_screen(workspace):
     async with started(workspace, (80, 24)) as (app, pilot):
-        for keys in ("", "enter", "v", "escape m", "escape c", "escape e", "escape s"):
+        for keys in ("", "enter", "v", "escape m", "escape c", "escape b", "escape e", "escape s"):
             await press(pilot, *keys.split())
             await look_around(app, pilot)
         await press(pilot, "escape", "escape", "n")
@@ -441,14 +483,14 @@ async def test_jump_mode_reaches_panes_by_letter(workspace):
 
 async def test_the_palette_opens_a_trial_by_name(workspace):
     async with started(workspace) as (app, pilot):
-        await press(pilot, "ctrl+p", *"opent05", "down", "enter")
+        await press(pilot, "ctrl+p", "text:opent05", "down", "enter")
         assert isinstance(app.screen, TrialPage)
         assert app.screen.folder.name == "2026-11-20_T05"
 
 
 async def test_search_narrows_the_list_and_escape_ends_it(workspace):
     async with started(workspace) as (app, pilot):
-        await press(pilot, "slash", *"warn", "enter")
+        await press(pilot, "slash", "text:warn", "enter")
         table = app.screen.query_one("#trials", DataTable)
         assert table.row_count == 1
         await press(pilot, "escape")
@@ -456,6 +498,7 @@ async def test_search_narrows_the_list_and_escape_ends_it(workspace):
         assert app.focused is table
 
 
+@pytest.mark.slow
 async def test_theme_trial_screen_and_marker_are_kept(workspace):
     async with started(workspace) as (app, pilot):
         await press(pilot, "l", "enter", "v", "right_square_bracket")
@@ -486,6 +529,7 @@ async def test_the_mouse_alone_reaches_results(workspace):
 EVIL = "[red]x[b] \x1b[31m\u202e\u200b" + "橄" * 40
 
 
+@pytest.mark.slow
 async def test_hostile_names_and_metadata_are_shown_harmless(workspace):
     folder = workspace / "trials" / EVIL
     toml = scene.TOML.replace('"Bari, plot 7"', '"""\\u001b[2J[b]' + "A" * 10_000 + '"""')
@@ -500,7 +544,7 @@ async def test_hostile_names_and_metadata_are_shown_harmless(workspace):
             assert "unreadable" in text
             await press(pilot, "end", "up", "up", "enter", "s", "escape", "escape", "down", "enter")
             assert not any(ord(c) < 32 for c in screen_text(app).replace("\n", ""))
-            await press(pilot, "escape", "ctrl+p", *"open")
+            await press(pilot, "escape", "ctrl+p", "text:open")
             assert not any(ord(c) < 32 for c in screen_text(app).replace("\n", ""))
 
 

@@ -1,4 +1,7 @@
-"""Pictures of every screen at 120 x 40 and at 80 x 24, on a fixed trial."""
+"""Pictures of every screen at 120 x 40 and at 80 x 24, on a fixed trial: one walk a size.
+
+Make them anew with ``pytest tests/test_tui_snapshots.py --snapshot-update`` and look at them.
+"""
 
 from __future__ import annotations
 
@@ -7,34 +10,37 @@ from pathlib import Path
 
 import pytest
 import tui_scene as scene
+from pytest_textual_snapshot import SVGImageExtension
 from small_videos import make_video
-from tui_app import press, settle
+from tui_app import press, settle, started
 
 from olivevib.errors import InputError
-from olivevib.tui.app import OlivevibApp
 from olivevib.tui.views.progress import Progress
 
 SIZES = ((120, 40), (80, 24))
-JOURNEYS = {
-    "trials": "",
-    "search": "slash w a r n",
-    "trial": "enter",
-    "trial_with_warnings": "down enter",
-    "new_trial_folder": "down down enter",
-    "orbits": "enter v",
-    "spectrum": "enter v 2 right",
-    "spectrum_undecided": "down v 2",
-    "markers": "enter v 3",
-    "motion": "enter m plus",
-    "comparison": "enter c",
-    "report": "enter e down",
-    "settings": "enter s s s",
-    "pictures": "enter k",
-    "form": "n T 0 7",
-    "help": "enter v question_mark",
-    "jump": "enter j",
-    "palette": "enter ctrl+p",
-}
+WALK = (
+    ("trials", ""),
+    ("search", "slash w a r n enter"),
+    ("trial_with_warnings", "enter"),
+    ("spectrum_undecided", "v 2"),
+    ("trial_new", "escape escape escape down down enter"),
+    ("results_empty", "v"),
+    ("trial", "escape escape up up enter"),
+    ("jump", "j"),
+    ("palette", "escape ctrl+p"),
+    ("orbits", "escape v"),
+    ("help", "question_mark"),
+    ("spectrum", "escape 2 right"),
+    ("markers", "3 down"),
+    ("motion", "escape m plus"),
+    ("comparison", "escape c"),
+    ("calibration", "escape b"),
+    ("report", "escape e down"),
+    ("settings", "escape s right_square_bracket right_square_bracket"),
+    ("edit", "enter"),
+    ("pictures", "escape escape k"),
+    ("form", "escape escape n T 0 7"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -55,68 +61,63 @@ def workspace(made, tmp_path, monkeypatch) -> Path:
     return Path()
 
 
-def keys_first(keys: str):
-    async def run(pilot) -> None:
-        await settle(pilot)
-        await press(pilot, *keys.split())
-
-    return run
+@pytest.fixture
+def svg(snapshot):
+    return snapshot.use_extension(SVGImageExtension)
 
 
-@pytest.mark.parametrize("size", SIZES, ids=["120x40", "80x24"])
-@pytest.mark.parametrize("journey", JOURNEYS)
-def test_screen(snap_compare, workspace, journey, size):
-    app = OlivevibApp(workspace)
-    before = keys_first(JOURNEYS[journey])
-    assert snap_compare(app, terminal_size=size, run_before=before)
-
-
-@pytest.mark.parametrize("journey", ["trials", "trial", "orbits"])
-def test_sunlight(snap_compare, workspace, journey):
-    app = OlivevibApp(workspace)
-    before = keys_first(f"l {JOURNEYS[journey]}")
-    assert snap_compare(app, terminal_size=(120, 40), run_before=before)
-
-
-def test_without_colour(snap_compare, workspace, monkeypatch):
-    monkeypatch.setenv("NO_COLOR", "1")
-    before = keys_first(JOURNEYS["spectrum"])
-    assert snap_compare(OlivevibApp(workspace), terminal_size=(120, 40), run_before=before)
+def name_of(picture: str, size: tuple[int, int]) -> str:
+    return f"{picture} {size[0]}x{size[1]}"
 
 
 @pytest.mark.parametrize("size", SIZES, ids=["120x40", "80x24"])
-def test_empty(snap_compare, tmp_path, monkeypatch, size):
-    (tmp_path / "olive").mkdir()
-    monkeypatch.chdir(tmp_path / "olive")
-    monkeypatch.setattr("olivevib.tui.screens.trials.whole_path", lambda path: "/home/ana/olive")
-    app = OlivevibApp(Path())
-    assert snap_compare(app, terminal_size=size, run_before=keys_first(""))
+async def test_every_screen_looks_as_it_did(svg, workspace, size):
+    changed = []
+    async with started(workspace, size) as (app, pilot):
+        for picture, keys in WALK:
+            await press(pilot, *keys.split())
+            if app.export_screenshot() != svg(name=name_of(picture, size)):
+                changed.append(picture)
+    assert not changed
 
 
 @pytest.mark.parametrize("size", SIZES, ids=["120x40", "80x24"])
-def test_busy(snap_compare, workspace, size):
-    """Work under way: a fixed state of it, so that no clock is in the picture."""
-    app = OlivevibApp(workspace)
-
-    async def run(pilot) -> None:
-        await settle(pilot)
+async def test_work_errors_and_an_empty_folder(svg, workspace, tmp_path, monkeypatch, size):
+    """A fixed state of the work, so that no clock is in the picture."""
+    changed = []
+    async with started(workspace, size) as (app, pilot):
         await press(pilot, "down", "down", "enter")
         app.progress = Progress("2026-11-21_T06: run", "tracking markers", 450, 1800, 31.0, 43.5)
-        await pilot.pause()
-
-    assert snap_compare(app, terminal_size=size, run_before=run)
-
-
-@pytest.mark.parametrize("size", SIZES, ids=["120x40", "80x24"])
-def test_error(snap_compare, workspace, size):
-    app = OlivevibApp(workspace)
-    faults = "  markers.size: there is no such key; did you mean 'size_mm'?\n  [b]: not markup"
-    error = InputError("trial.toml has 2 fault(s):", faults, "Correct the file and run again.")
-
-    async def run(pilot) -> None:
         await settle(pilot)
-        await press(pilot, "enter")
-        app.show_error(error)
+        if app.export_screenshot() != svg(name=name_of("busy", size)):
+            changed.append("busy")
+        app.progress = None
+        faults = "  markers.size: there is no such key; did you mean 'size_mm'?\n  [b]: no markup"
+        app.show_error(InputError("trial.toml has 2 fault(s):", faults, "Correct the file."))
         await settle(pilot)
+        if app.export_screenshot() != svg(name=name_of("error", size)):
+            changed.append("error")
+    (tmp_path / "new").mkdir()
+    monkeypatch.chdir(tmp_path / "new")
+    monkeypatch.setattr("olivevib.tui.screens.trials.whole_path", lambda path: "/home/ana/olive")
+    async with started(workspace, size) as (app, pilot):
+        if app.export_screenshot() != svg(name=name_of("empty", size)):
+            changed.append("empty")
+    assert not changed
 
-    assert snap_compare(app, terminal_size=size, run_before=run)
+
+@pytest.mark.slow
+async def test_sunlight_and_no_colour(svg, workspace, monkeypatch):
+    changed = []
+    async with started(workspace) as (app, pilot):
+        for picture, keys in (("trials", "l"), ("trial", "enter"), ("orbits", "v")):
+            await press(pilot, *keys.split())
+            if app.export_screenshot() != svg(name=f"sunlight {picture}"):
+                changed.append(picture)
+    shutil.rmtree(workspace / ".olivevib")
+    monkeypatch.setenv("NO_COLOR", "1")
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "v", "2", "right")
+        if app.export_screenshot() != svg(name="without colour"):
+            changed.append("without colour")
+    assert not changed

@@ -364,9 +364,12 @@ def test_the_progress_line_never_loses_how_to_stop():
 
 
 def test_warnings_come_with_their_remedies():
-    text = warnings_text([{"code": "a-b", "text": "It is dark.", "remedy": "Add light."}], PLAIN)
+    text = warnings_text(
+        [{"code": "a-b", "text": "It is dark.", "remedy": "Add light."}], True, PLAIN
+    )
     assert text.plain == "⚠ It is dark.\n  Add light.  [a-b]"
-    assert warnings_text([], PLAIN).plain == "No warnings."
+    assert warnings_text([], True, PLAIN).plain == "No warnings."
+    assert "r runs every stage" in warnings_text([], False, PLAIN).plain
 
 
 def test_facts_of_a_new_trial_are_not_known():

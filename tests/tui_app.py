@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
 from rich.text import Text
+from textual.app import App
 from textual.pilot import Pilot
 from textual.worker import WorkerCancelled, WorkerFailed
 
@@ -17,13 +19,32 @@ OURS = {"read", "work", "frame", "first", "save", "kept"}
 
 
 async def settle(pilot: Pilot[None]) -> None:
-    """Wait until no thread of ours is at work and every message has been handled."""
-    await pilot.pause()
+    """Wait until no thread of ours is at work, every message is handled, every layout is made."""
+    await quiet(pilot)
     while running := [w for w in pilot.app.workers if w.group in OURS and not w.is_finished]:
         for worker in running:
             with contextlib.suppress(WorkerCancelled, WorkerFailed):
                 await worker.wait()
-        await pilot.pause()
+        await quiet(pilot)
+
+
+async def quiet(pilot: Pilot[None], turns: int = 3) -> None:
+    """Wait until nothing has been waiting for a few turns, however loaded the machine is."""
+    calm = 0
+    while calm < turns:
+        await asyncio.sleep(0.01)
+        calm = 0 if is_busy(pilot.app) else calm + 1
+
+
+def is_busy(app: App[None]) -> bool:
+    """Whether a message, a layout or a repaint is still to come."""
+    if app._exit:
+        return False
+    screen = app.screen
+    nodes = [app, *app.screen_stack, *screen.walk_children()]
+    waiting = any(not node._message_queue.empty() for node in nodes)
+    due = screen._layout_required or screen._repaint_required or bool(screen._dirty_widgets)
+    return waiting or due or bool(screen._callbacks)
 
 
 @asynccontextmanager
@@ -38,9 +59,9 @@ async def started(
 
 
 async def press(pilot: Pilot[None], *keys: str) -> None:
-    """Press keys one after the other, each with all that it sets off."""
+    """Press keys one after the other, each with all that it sets off; ``text:…`` is typed."""
     for key in keys:
-        await pilot.press(key)
+        await pilot.press(*(key[5:] if key.startswith("text:") else [key]))
         await settle(pilot)
 
 

@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import av
+import cv2
 import numpy as np
 
 from olivevib.comparison import Comparison, LineDifference, Verdict
 from olivevib.errors import Caution
+from olivevib.files.prints.marker import marker_picture
 from olivevib.files.rig_file import write_rig
 from olivevib.files.store import write_stage
 from olivevib.geometry import CameraModel, StereoRig
+from olivevib.marker import load_library
 from olivevib.reconstruction import Reconstruction, Trajectory, TrialClock
 from olivevib.signals import State
 from olivevib.tracking import Track
@@ -188,6 +192,21 @@ def tracks() -> StoredTracks:
     return StoredTracks(tuple(both["left"]), tuple(both["right"]), cameras, stamps, (), "edges", ())
 
 
+def marker_video(path: Path, marker: int, frames: int = 3) -> None:
+    """A still recording, 640 x 480, of one printed marker in front of grey."""
+    grey = np.full((480, 640), 120, np.uint8)
+    card = marker_picture(load_library("olive49"), marker, 8)
+    grey[180 : 180 + len(card), 260 : 260 + len(card)] = card
+    with av.open(str(path), "w") as out:
+        stream = out.add_stream("ffv1", rate=30)
+        stream.width, stream.height, stream.pix_fmt = 640, 480, "gray"
+        for k in range(frames):
+            frame = av.VideoFrame.from_ndarray(cv2.GaussianBlur(grey, (0, 0), 0.7), format="gray")
+            frame.pts = k
+            out.mux(stream.encode(frame))
+        out.mux(stream.encode(None))
+
+
 def comparison() -> Comparison:
     """The first marker against its sensor: they agree."""
     optical = displacement()[:, 0]
@@ -224,9 +243,14 @@ def remeasure(folder: Path, status: LineStatus = LineStatus.DIRECT, sensor: bool
     def write(stage: str, file: str, make, *values: object) -> None:
         write_stage(folder / file, make(*values, trial.fingerprint(stage)))
 
+    u, v = np.meshgrid(np.arange(230, 620, 30), np.arange(40, 460, 30))
+    wave = 0.15 * np.sin(np.stack([u, v], axis=-1).reshape(-1, 2) / 17)
+    wave[5] = 1.5
+    board = np.column_stack([u.ravel(), v.ravel(), wave])
     record = CalibrationRecord(
         "rig file", "", rms_left_px=0.142, rms_right_px=0.151, epipolar_rms_px=0.21,
         holdout_rms_mm=0.31, holdout_rms_percent=0.28, verdict="taken over from shared_rig.toml",
+        residuals_left=board, residuals_right=board - [200, 0, 0, 0],
     )  # fmt: skip
     write_rig(folder / "rig.toml", rig(), {})
     write("calibrate", "calibration.h5", calibration_file, record)

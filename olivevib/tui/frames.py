@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,7 +35,10 @@ class Seen:
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture: side and number, grey (None: damaged or past the end), markers, instant."""
+    """One picture: side and number, grey (None: damaged or past the end), markers, instant.
+
+    detected: the markers were found in this picture alone, just now, not tracked.
+    """
 
     side: str
     index: int
@@ -43,6 +46,7 @@ class Shot:
     grey: Grey | None
     markers: tuple[Seen, ...]
     t_s: float
+    detected: bool = False
 
 
 class FrameReader:
@@ -52,6 +56,7 @@ class FrameReader:
         from olivevib.trial import Trial
 
         trial = Trial.open(folder)
+        self._folder = folder
         self._paths = {s: trial.path(getattr(trial.settings.cameras, s).video) for s in SIDES}
         self._tracks = trial.tracks
         self._lock = threading.Lock()
@@ -64,6 +69,22 @@ class FrameReader:
         row = row_of(self._tracks, side, reached)
         seen = markers_at(self._tracks.of(side), row) if self._tracks else ()
         return Shot(side, reached, self._count(side), grey, seen, stamp_s)
+
+    def initialised(self, side: str, index: int) -> Shot:
+        """The same picture, with the markers that the detector finds in it alone, now.
+
+        The paper's INITIALIZE with the parameters of trial.toml as they are at this moment.
+        """
+        from olivevib.detection import Detector
+        from olivevib.pipeline.libraries import trial_library
+        from olivevib.trial import Trial
+
+        shot, trial = self.shot(side, index), Trial.open(self._folder)
+        detector = Detector(trial_library(trial), trial.settings.detection)
+        found = detector.detect(shot.grey) if shot.grey is not None else []
+        nothing = np.empty((0, 2))
+        markers = tuple(Seen(d.id, d.corners_px, nothing, "seen", np.nan) for d in found)
+        return replace(shot, markers=markers, detected=True)
 
     def close(self) -> None:
         """Release the recording."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from olivevib.comparison import Comparison
     from olivevib.reconstruction import Trajectory
     from olivevib.trial import Trial
+    from olivevib.tui.views.coverage import Coverage
     from olivevib.tui.views.setting_rows import SettingRow
     from olivevib.vibration import Vibration
 
@@ -79,6 +80,16 @@ class Results:
     vibration: Vibration | None = None
     comparisons: tuple[Comparison, ...] = ()
     places: Mapping[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CalibrationFacts:
+    """What the calibration page shows; no coverage before the stage has run."""
+
+    summary: Mapping[str, Any]
+    coverage: tuple[Coverage, ...] = ()
+    places: tuple[str, ...] = ()
+    cautions: tuple[Mapping[str, str], ...] = ()
 
 
 def guarded(read: Callable[[], Value]) -> Value | OlivevibError:
@@ -181,6 +192,35 @@ def results(folder: Path) -> Results:
     return Results(
         folder, summary(trial), trial.trajectory, trial.vibration, trial.comparison, marked
     )
+
+
+def calibration_facts(folder: Path) -> CalibrationFacts:
+    """What the calibration page shows; raises InputError where a file cannot be read."""
+    from olivevib.trial import Trial
+    from olivevib.trial.summary import summary
+    from olivevib.tui.views.coverage import Coverage, camera_places
+
+    trial = Trial.open(folder)
+    record, rig, facts = trial.calibration, trial.rig, summary(trial)
+    if record is None or rig is None:
+        return CalibrationFacts(facts)
+    points = (record.residuals_left, record.residuals_right)
+    sizes = (rig.left.size_px, rig.right.size_px)
+    return CalibrationFacts(
+        facts,
+        tuple(map(Coverage, ("left", "right"), points, sizes)),
+        camera_places(rig.R_right_left, rig.t_right_left_mm),
+        tuple(vars(c) for c in record.cautions),
+    )
+
+
+def form_values(folder: Path) -> dict[str, str]:
+    """What a new trial may take over from another one: markers, board, cameras, band."""
+    from olivevib.trial import Trial
+    from olivevib.tui.plan import values_of
+
+    trial = Trial.open(folder)
+    return values_of(trial.settings, trial.path)
 
 
 def setting_values(folder: Path) -> tuple[SettingRow, ...]:

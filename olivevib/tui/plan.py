@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +11,7 @@ from olivevib.errors import UsageError
 
 if TYPE_CHECKING:
     from olivevib.pipeline import NewTrial
+    from olivevib.trial import TrialSettings
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,29 @@ def plan_of(values: Mapping[str, str]) -> NewTrial:
         accelerometer_marker=_whole(said, "accelerometer_marker"),
         link=said.get("link", "no").lower() in ("yes", "y", "true", "1"),
     )
+
+
+def values_of(settings: TrialSettings, place: Callable[[str], Path]) -> dict[str, str]:
+    """The fields that a trial like this one shares with it; ``place`` resolves a file's name.
+
+    Recordings, stamps and sensor files are the new trial's own and stay empty.
+    """
+    markers, cameras, calibration = settings.markers, settings.cameras, settings.calibration
+    rows = [r for r in (cameras.left.row_time_us, cameras.right.row_time_us) if r is not None]
+    band, library = settings.vibration.band_hz, markers.library
+    shared = {
+        "board": calibration.board,
+        "rig": str(place("rig.toml")) if place("rig.toml").exists() else None,
+        "size": markers.size_mm,
+        "ids": ",".join(map(str, markers.ids)),
+        "markers": str(place(library)) if library.endswith(".toml") else library,
+        "shutter": None if cameras.shutter == "unknown" else cameras.shutter,
+        "row_time": ",".join(f"{row:g}" for row in rows) if len(rows) == 2 else None,
+        "band": f"{band[0]:g}-{band[1]:g}" if band else None,
+    }
+    if shared["rig"]:
+        shared["board"] = None  # the same cameras, not moved: their calibration is taken over
+    return {name: f"{value}" for name, value in shared.items() if value}
 
 
 def trial_name(values: Mapping[str, str]) -> str:

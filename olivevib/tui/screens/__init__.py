@@ -13,6 +13,7 @@ PAGES = {
     "trial": "trial:TrialPage",
     "results": "results:ResultsPage",
     "motion": "motion:MotionPage",
+    "calibration": "calibration:CalibrationPage",
     "compare": "compare:ComparePage",
     "pictures": "pictures:PicturesPage",
     "report": "report:ReportPage",

@@ -18,7 +18,8 @@ from olivevib.arrays import Grey
 from olivevib.errors import OlivevibError
 from olivevib.tui import jobs
 from olivevib.tui.frames import first_frame
-from olivevib.tui.loader import guarded
+from olivevib.tui.harmless import harmless
+from olivevib.tui.loader import form_values, guarded
 from olivevib.tui.plan import FIELDS, PATHS, guesses, plan_of, trial_name
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.screens.pick import PickScreen
@@ -51,6 +52,24 @@ class NewTrialPage(Page):
         def __init__(self, side: str, frame: Grey | OlivevibError) -> None:
             super().__init__()
             self.side, self.frame = side, frame
+
+    def __init__(self, workspace: Path, like: Path | None = None) -> None:
+        super().__init__(workspace)
+        self._like = like
+
+    def read(self) -> dict[str, str]:
+        """What the trial that was marked shares with the new one."""
+        return form_values(self._like) if self._like is not None else {}
+
+    def show(self, value: object) -> None:
+        """Fill what is empty."""
+        if isinstance(value, dict) and self._like is not None:
+            for name, text in value.items():
+                field = self.query_one(f"#{name}", Input)
+                field.value = field.value or text
+            name = harmless(self._like.name, 40)
+            self.query_one("#form").border_subtitle = f"settings as in {name}"
+            self._like = None
 
     def body(self) -> ComposeResult:
         """First frames above, the form below."""

@@ -32,15 +32,18 @@ class PicturesPage(Page):
     HELP_TEXT = Help(
         "One camera's recording, with a bracket and the id about every tracked marker; beside it "
         "a window of 280 × 210 pixels about the marked one, with the trail of its last frames. "
-        "Before tracking the pictures are shown alone: use them to judge light and focus.",
+        "Before tracking the pictures are shown alone: use them to judge light and focus. i finds "
+        "the markers in this picture alone with the parameters of now (the paper's INITIALIZE): "
+        "change detection.* in the settings and come back to see the effect.",
         "A marker should be at least 40 pixels wide, its bars even grey, its white not burnt "
         "out, its edges sharp also while it moves; seen in 95 % of the frames or more.",
     )
     JUMPS = (Jump("p", "#whole"), Jump("w", "#inset"))
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("space", "play", "Play, stop"),
-        Binding("c,tab", "camera", "Other camera", key_display="c"),
+        Binding("o,tab", "camera", "Other camera", key_display="o"),
         Binding("z", "zoom", "Window"),
+        Binding("i", "initialise", "Find markers now", show=False),
         Binding("right_square_bracket", "marker(1)", "Next marker", key_display="]"),
         Binding("left_square_bracket", "marker(-1)", "Marker before", show=False, key_display="["),
         Binding("right,full_stop", "step(1)", "Next frame", show=False),
@@ -53,6 +56,7 @@ class PicturesPage(Page):
     _shot: Shot | None = None
     _side = SIDES[0]
     _playing: Timer | None = None
+    _detecting = False
 
     def body(self) -> ComposeResult:
         """Whole picture and window."""
@@ -75,14 +79,17 @@ class PicturesPage(Page):
         if self._reader is not None:
             self._reader.close()
         self._reader = FrameReader(self.folder)
-        return self._reader.shot(self._side, self._shot.index if self._shot else 0)
+        return self._take(self._reader, self._side, self._shot.index if self._shot else 0)
+
+    def _take(self, reader: FrameReader, side: str, index: int) -> Shot:
+        return (reader.initialised if self._detecting else reader.shot)(side, index)
 
     @work(thread=True, exclusive=True, group="frame")
     def _go(self, side: str, index: int) -> None:
         """Read a frame in a thread; one that is no longer wanted is not shown."""
         worker, reader = get_current_worker(), self._reader
         if reader is not None:
-            shot = guarded(lambda: reader.shot(side, index))
+            shot = guarded(lambda: self._take(reader, side, index))
             if not worker.is_cancelled:
                 self.post_message(self.Read(shot))
 
@@ -143,6 +150,11 @@ class PicturesPage(Page):
         """Frames on or back."""
         if self._shot is not None:
             self._go(self._side, self._shot.index + frames)
+
+    def action_initialise(self) -> None:
+        """The paper's INITIALIZE on this picture, with the parameters of now; or the tracks."""
+        self._detecting = not self._detecting
+        self.action_step(0)
 
     def action_camera(self) -> None:
         """The other camera, at the same frame."""

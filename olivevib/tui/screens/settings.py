@@ -39,7 +39,7 @@ class SettingsPage(Page):
     JUMPS = (Jump("s", "#settings"),)
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("enter", "edit", "Change", priority=False),
-        Binding("s", "section", "Next section"),
+        Binding("right_square_bracket", "section", "Next section", key_display="]"),
     ]
     _rows: tuple[SettingRow, ...] = ()
 

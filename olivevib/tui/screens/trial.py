@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import ClassVar
 
 from rich.text import Text
@@ -16,14 +17,22 @@ from olivevib.tui import jobs
 from olivevib.tui.harmless import plain
 from olivevib.tui.loader import STAGE_NAMES, TrialFacts, trial_facts
 from olivevib.tui.screens.error import error_text
-from olivevib.tui.screens.page import Help, Jump, Page
+from olivevib.tui.screens.page import Command, Help, Jump, Page
 from olivevib.tui.widgets.title import Title
 
 FOUND_ON = {
-    "calibrate": "",  # told beside the stages
+    "calibrate": "calibration",
     "track": "pictures",
     "reconstruct": "results",
     "analyse": "results",
+    "compare": "compare",
+}
+
+PAPER_WORDS = {
+    "calibrate": "calibrate",
+    "track": "track (INITIALIZE and TRACK of the paper)",
+    "reconstruct": "reconstruct (STEREO 3D of the paper)",
+    "analyse": "analyse",
     "compare": "compare",
 }
 
@@ -49,6 +58,7 @@ class TrialPage(Page):
         Binding("v", "page('results')", "Results"),
         Binding("e", "page('report')", "Report"),
         Binding("s", "page('settings')", "Settings"),
+        Binding("b", "page('calibration')", "Board and calibration", show=False),
         Binding("m", "page('motion')", "Motion over time", show=False),
         Binding("c", "page('compare')", "Compare with accelerometer", show=False),
         Binding("k", "page('pictures')", "Pictures with markers", show=False),
@@ -94,7 +104,11 @@ class TrialPage(Page):
         if summary is None:
             warnings, known, count = error_text(facts.fault), Text(""), 1
         else:
-            warnings, count = warnings_text(summary["warnings"], palette), len(summary["warnings"])
+            run = any(stage.state in ("done", "stale") for stage in facts.stages)
+            warnings, count = (
+                warnings_text(summary["warnings"], run, palette),
+                len(summary["warnings"]),
+            )
             known = facts_text(summary, palette)
         self.query_one("#warning-text", Static).update(warnings)
         self.query_one("#fact-text", Static).update(known)
@@ -125,15 +139,22 @@ class TrialPage(Page):
     @on(DataTable.RowSelected, "#stages")
     def action_open(self) -> None:
         """Show what the marked stage found."""
-        page = FOUND_ON[STAGE_NAMES[self.query_one("#stages", DataTable).cursor_row]]
-        if page:
-            self.action_page(page)
-        else:
-            self.query_one("#facts").focus()
+        stage = STAGE_NAMES[self.query_one("#stages", DataTable).cursor_row]
+        self.action_page(FOUND_ON[stage])
 
     def action_run_one(self) -> None:
         """Run the marked stage, whatever its state."""
         stage = STAGE_NAMES[self.query_one("#stages", DataTable).cursor_row]
+        self._run_stage(stage)
+
+    def commands(self) -> list[Command]:
+        """Each stage, with the paper's word for it."""
+        return [
+            Command(f"Run {words}", partial(self._run_stage, stage))
+            for stage, words in PAPER_WORDS.items()
+        ]
+
+    def _run_stage(self, stage: str) -> None:
         self.olive.start(jobs.run_one(self.folder, stage))
 
     def action_check(self) -> None:

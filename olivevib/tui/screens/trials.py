@@ -46,7 +46,8 @@ class TrialsPage(Page):
         Binding("slash", "search", "Search", key_display="/"),
         Binding("r", "run", "Run"),
         Binding("v", "results", "Results", show=False),
-        Binding("d", "demo", "Make a simulated trial", show=False),
+        Binding("N", "copy", "New trial with the settings of this one", show=False),
+        Binding("g", "demo", "Make a simulated trial", show=False),
         Binding("f5", "reload", "Read again", show=False),
     ]
 
@@ -191,6 +192,12 @@ class TrialsPage(Page):
         from olivevib.tui.screens.new_trial import NewTrialPage
 
         self.app.push_screen(NewTrialPage(self.folder))
+
+    def action_copy(self) -> None:
+        """Make a new trial with the settings of the marked one."""
+        from olivevib.tui.screens.new_trial import NewTrialPage
+
+        self.app.push_screen(NewTrialPage(self.folder, self.marked))
 
     def action_search(self) -> None:
         """Type part of a name."""

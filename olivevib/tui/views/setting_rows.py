@@ -27,7 +27,14 @@ MEANS = {
     "vibration.band_hz": "where the shaker's frequency may lie, [5, 45]",
     "reconstruction.right_offset_ms": "add to the right camera's stamps, where it is known",
     "machine.set_frequency_hz": "as its operator set it; never used by the analysis",
-    "detection.mode": "auto or paper",
+    "detection.fill": "Δfill: least share of its rectangle that a location bar fills",
+    "detection.pos": "Δpos: largest distance of two bars, in lengths of the longer one",
+    "detection.angle_deg": "Δangle: smallest angle between neighbouring bars, degrees",
+    "detection.conf": "Δconf: largest share of unmatched modules of the code area",
+    "detection.scale": "Δscale: how much a location rectangle exceeds the last box",
+    "detection.marker": "Δmarker: how many markers a frame must show; 0: all seen so far",
+    "detection.mode": "which detector reads the markers; paper: as the paper does",
+    "detection.paper_centre": "true: the mean of the cornerstones as centre (biased)",
     "outcome.removed_kg": "what the harvest gave",
 }
 

@@ -45,10 +45,13 @@ def shot_words(shot: Shot, chosen: int | None, palette: Palette) -> Text:
     out.append(f"{shot.side}  frame {shot.index}{total}", palette.accent)
     if np.isfinite(shot.t_s):
         out.append(f"  {shot.t_s:.4f} s (camera's stamp)", palette.muted)
-    out.append(f"  {len(shot.markers)} markers" if shot.markers else "  no markers tracked here")
+    found = "found in this picture alone" if shot.detected else "tracked here"
+    out.append(f"  {len(shot.markers) or 'no'} markers {found}")
     for marker in shot.markers:
         if marker.id == chosen:
             sides = np.hypot(*np.diff(marker.corners_px[[0, 1, 2, 3, 0]], axis=0).T)
             out.append(f"\nmarker {marker.id} {marker.state}", palette.accent)
-            out.append(f"  {sides.mean():.0f} px wide, seen in {marker.share:.0%} of the frames")
+            out.append(f"  {sides.mean():.0f} px wide")
+            if np.isfinite(marker.share):
+                out.append(f", seen in {marker.share:.0%} of the frames")
     return out

@@ -61,8 +61,10 @@ def marker_row(marker: Mapping[str, Any], palette: Palette) -> tuple[Text, ...]:
     )
 
 
-def warnings_text(warnings: Sequence[Mapping[str, str]], palette: Palette) -> Text:
-    """Every warning with its remedy; says so where there are none."""
+def warnings_text(warnings: Sequence[Mapping[str, str]], run: bool, palette: Palette) -> Text:
+    """Every warning with its remedy; what to do first where nothing has ``run`` yet."""
+    if not run:
+        return Text("Nothing has run yet.\nr runs every stage; s describes the trial first.")
     if not warnings:
         return Text("No warnings.", palette.muted)
     out = Text()

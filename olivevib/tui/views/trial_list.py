@@ -70,7 +70,7 @@ def empty_text(place: str, is_workspace: bool, palette: Palette) -> Text:
     out.append("holds no trial.\n\n" if is_workspace else "is no workspace yet.\n\n")
     for key, words in (
         ("n", "make a trial from two recordings"),
-        ("d", "make a simulated trial, to try everything"),
+        ("g", "make a simulated trial, to try everything"),
         ("?", "what this screen shows"),
         ("q", "leave, and start olivevib in another folder"),
     ):

@@ -1,0 +1,84 @@
+"""The calibration: where the board was seen, how well it fits, what it means in mm."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, VerticalScroll
+from textual.widgets import Static
+
+from olivevib.tui import jobs
+from olivevib.tui.loader import CalibrationFacts, calibration_facts
+from olivevib.tui.screens.page import Help, Jump, Page
+from olivevib.tui.views.coverage import calibration_text, coverage_plot
+from olivevib.tui.widgets.plot import Plot
+
+SIDES = ("left", "right")
+
+
+class CalibrationPage(Page):
+    """Both cameras' coverage, and the verdict below."""
+
+    NAME = "calibration"
+    HELP_TEXT = Help(
+        "Every dot is a point of the calibration board as a camera saw it; red ones lie more than "
+        "three times the rms away from where the model puts them. Where no dot is, the lens is "
+        "only extrapolated. The verdict is of views that the fit never saw: distances on the "
+        "board, in mm and per cent.",
+        "Fit rms 0.1–0.3 px; distances on unused views within 0.5 mm or 0.3 %; dots in every "
+        "corner of both pictures, the board tilted by 20–45°, near and far.",
+    )
+    JUMPS = (Jump("l", "#left-board"), Jump("r", "#right-board"), Jump("v", "#verdict"))
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("t", "again", "Calibrate again"),
+        Binding("o", "camera", "Other camera"),
+    ]
+    _found: CalibrationFacts | None = None
+
+    def body(self) -> ComposeResult:
+        """Two pictures above, words below."""
+        with Horizontal(id="boards"):
+            for side in SIDES:
+                yield Plot(id=f"{side}-board", title=f"{side} camera")
+        with VerticalScroll(id="verdict", classes="pane"):
+            yield Static("reading …", id="verdict-text", markup=False)
+
+    def on_mount(self) -> None:
+        """Left camera first."""
+        self.query_one("#verdict").border_title = "Verdict"
+        self.query_one("#left-board").focus()
+
+    def read(self) -> CalibrationFacts:
+        """Residuals, rig and verdict from the files."""
+        return calibration_facts(self.folder)
+
+    def show(self, value: object) -> None:
+        """Draw both pictures; say what to do where there is no calibration."""
+        if not isinstance(value, CalibrationFacts):
+            return
+        self._found = value
+        for coverage in value.coverage:
+            plot = self.query_one(f"#{coverage.side}-board", Plot)
+            plot.show(partial(coverage_plot, coverage))
+        self.query_one("#verdict-text", Static).update(
+            calibration_text(value.summary, value.places, value.cautions, self.olive.palette)
+            if value.coverage
+            else "Not calibrated yet: t runs it. trial.toml names the board recordings or a rig."
+        )
+
+    def recolour(self) -> None:
+        """Draw again in the new theme."""
+        self.show(self._found)
+
+    def action_again(self) -> None:
+        """Run the stage."""
+        self.olive.start(jobs.run_one(self.folder, "calibrate"))
+
+    def action_camera(self) -> None:
+        """In a small terminal: the other picture."""
+        self.toggle_class("-zoomed")
+        side = SIDES[self.has_class("-zoomed")]
+        self.query_one(f"#{side}-board").focus()
