@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
-from collections import namedtuple
 
 import pytest
 from capture_cameras import MjpegServer, Plan, jpeg, number_of
@@ -130,6 +128,7 @@ def test_a_silent_camera_is_closed_within_a_second_and_goes_on_when_it_comes_bac
     assert without_gaps(numbers(captured.videos["right"]))
 
 
+@pytest.mark.slow
 def test_a_pause_of_our_own_is_not_the_cameras_silence(tmp_path):
     slept = []
 
@@ -143,6 +142,7 @@ def test_a_pause_of_our_own_is_not_the_cameras_silence(tmp_path):
     assert without_gaps(numbers(captured.videos["left"]))
 
 
+@pytest.mark.slow
 def test_a_camera_that_is_plugged_in_again_is_found_again(tmp_path):
     address = {}
     with MjpegServer(FAST) as right:
@@ -195,6 +195,8 @@ def test_what_cannot_be_recorded_is_told_before_anything_is_written(tmp_path):
     with MjpegServer(FAST) as left, MjpegServer(Plan(size=(64, 48))) as other:
         with pytest.raises(UsageError, match="128 x 96"):
             capture(tmp_path / "T", plan(left, other))
+        with pytest.raises(UsageError, match="--seconds 0"):
+            capture(tmp_path / "T", plan(left, left, seconds=0.0))
         with pytest.raises(UsageError, match="no marker 4000"):
             capture(tmp_path / "T", plan(left, left, ids=(4000,)))
         with pytest.raises(InputError, match="nearly full"):
@@ -207,20 +209,36 @@ def test_what_cannot_be_recorded_is_told_before_anything_is_written(tmp_path):
     assert [p.name for p in (tmp_path / "T").iterdir()] == ["left.mkv"]
 
 
-def test_recording_stops_before_the_disk_is_full(tmp_path, monkeypatch):
-    usage = namedtuple("usage", "free")
+def full_after(monkeypatch, seconds):
+    """The disk has room for so long, then nearly none."""
     begun = time.monotonic()
-    monkeypatch.setattr(
-        session_room.shutil,
-        "disk_usage",
-        lambda path: usage(500_000 if time.monotonic() - begun > 1.2 else 10**12),
-    )
+
+    def free_bytes(folder):
+        return 500_000 if time.monotonic() - begun > seconds else 10**12
+
+    monkeypatch.setattr(session_room, "_free_bytes", free_bytes)
+
+
+def test_recording_stops_before_the_disk_is_full(tmp_path, monkeypatch):
+    full_after(monkeypatch, 1.2)
     with MjpegServer(FAST) as left, MjpegServer(FAST) as right:
         captured = capture(tmp_path / "T", plan(left, right, seconds=30))
     assert isinstance(captured.error, InputError)
     assert "nearly full" in captured.error.what
     assert verify(captured.videos["left"]).whole
     assert verify(captured.videos["right"]).whole
+
+
+def test_a_full_disk_is_an_error_with_everything_kept(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    full_after(monkeypatch, 1.8)
+    with MjpegServer(FAST) as left, MjpegServer(FAST) as right:
+        command = ["capture", "T01", "--left", left.address, "--right", right.address]
+        assert main([*command, "--seconds", "30", "--no-preview"]) == 1
+    out, told = capsys.readouterr()
+    assert "nearly full" in told
+    assert "drops" in out
+    assert (tmp_path / "T01" / "left.nut").is_file()
 
 
 # --- the verb
@@ -241,11 +259,16 @@ def test_the_verb_records_a_trial_and_says_what_it_is_good_for(tmp_path, monkeyp
     assert "every checksum right" in capsys.readouterr().out
 
 
+def recorded_trial(folder):
+    """A trial with half a second of two cameras."""
+    with MjpegServer(FAST) as left, MjpegServer(FAST) as right:
+        asked = plan(left, right, seconds=0.4)
+        trial_from(folder, asked, capture(folder, asked))
+
+
 def test_check_names_the_frames_that_were_altered_afterwards(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    with MjpegServer(FAST) as left, MjpegServer(FAST) as right:
-        command = ["capture", "T01", "--left", left.address, "--right", right.address]
-        assert main([*command, "--seconds", "0.4", "--no-preview"]) == 0
+    recorded_trial(tmp_path / "T01")
     video = tmp_path / "T01" / "left.nut"
     frames = packets(video)
     data = bytearray(video.read_bytes())
@@ -258,16 +281,13 @@ def test_check_names_the_frames_that_were_altered_afterwards(tmp_path, monkeypat
 
 def test_a_copied_recording_keeps_its_checksums(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    with MjpegServer(FAST) as left, MjpegServer(FAST) as right:
-        command = ["capture", "T01", "--left", left.address, "--right", right.address]
-        assert main([*command, "--seconds", "0.4", "--no-preview"]) == 0
+    recorded_trial(tmp_path / "T01")
     again = ["new", "T02", "--left", "T01/left.nut", "--right", "T01/right.nut"]
     again += ["--left-stamps", "T01/left.stamps.csv", "--right-stamps", "T01/right.stamps.csv"]
     assert main(again) == 0
     assert (tmp_path / "T02" / "right.stamps.csv").is_file()
     assert main(["check", "T02"]) == 0
     assert capsys.readouterr().out.count("every checksum right") == 2
-    shutil.rmtree("T02")
 
 
 def test_the_board_waits_for_its_tree_and_the_tree_for_its_board(tmp_path):
@@ -285,9 +305,8 @@ def test_the_board_waits_for_its_tree_and_the_tree_for_its_board(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
-@pytest.mark.parametrize(
-    ("seconds", "code"), [(None, 0), pytest.param("60", 130, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("seconds", "code"), [(None, 0), ("60", 130)])
 def test_ctrl_c_ends_the_recording_cleanly(tmp_path, seconds, code):
     with MjpegServer(FAST) as left, MjpegServer(FAST) as right:
         command = [sys.executable, "-m", "olivevib", "capture", str(tmp_path / "T")]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from olivevib import values
 from olivevib.cli.console import Console
+from olivevib.errors import OlivevibError, UsageError
 from olivevib.progress import Cancelled
 
 if TYPE_CHECKING:
@@ -33,11 +34,13 @@ def capture(arguments: argparse.Namespace, console: Console) -> int:
         watch = _Watcher(console, stop)
         captured = record(place, plan, watch, console.tick)
     cut_short = stop.asked and plan.seconds is not None
-    trial = trial_from(folder, plan, captured, arguments.marker_size, console.tick)
     print(captured.verdict.words)
     warned = console.cautions(captured.cautions)
     if captured.error is not None:
+        with contextlib.suppress(OlivevibError):  # the disk may have no room for trial.toml
+            trial_from(folder, plan, captured, arguments.marker_size, console.tick)
         raise captured.error
+    trial = trial_from(folder, plan, captured, arguments.marker_size, console.tick)
     if len(captured.videos) < 2:
         console.error("the trial was not made: not both cameras delivered pictures.")
         return 1
@@ -56,7 +59,6 @@ def _next(name: str, plan: CapturePlan, *, made: bool, console: Console) -> None
 
 def _folder(name: str) -> Path:
     """The trial's folder: one that is there, or the place for a new one."""
-    from olivevib.errors import UsageError
     from olivevib.trial.workspace import find_trial, place_for_new
 
     try:

@@ -1,10 +1,10 @@
-# ruff: noqa: T201 (a study prints what it found)
 """Long runs of the recorder: what it loses in ten minutes, in fifty kills, with flipped bytes.
 
     python tests/studies/capture.py loss --fps 30 --seconds 600 [--preview]
     python tests/studies/capture.py kill --times 50
     python tests/studies/capture.py flips --times 200
     python tests/studies/capture.py million
+    python tests/studies/capture.py vanish --times 5
     python tests/studies/capture.py full        (needs the right to mount a small tmpfs)
 
 Each prints one line a measurement. The cameras are MJPEG servers on 127.0.0.1 in processes of
@@ -89,6 +89,10 @@ class Cameras:
     def sent(self):
         """What each camera has sent: number -> checksum."""
         return [_read_log(log) for log in self.logs]
+
+    def stop_left(self, how):
+        """Kill or stop the left camera's process."""
+        self._processes[0].send_signal(how)
 
     def close(self):
         for process in self._processes:
@@ -271,6 +275,35 @@ def million(arguments):
         print(f"{told.frames} frames written in {wrote:.0f} s: {told.words}; whole: {told.whole}")
 
 
+def vanish(arguments):
+    """How soon the file of a camera is closed that dies (kill) or falls silent (stop)."""
+    from olivevib.pipeline.capture import CapturePlan, capture
+
+    for how in (signal.SIGKILL, signal.SIGSTOP):
+        closed, others = [], []
+        for _ in range(arguments.times):
+            with tempfile.TemporaryDirectory() as name:
+                folder = Path(name)
+                cameras = Cameras(folder, 30, "1280x720")
+                seen = {}
+
+                def watch(state, cameras=cameras, seen=seen, how=how):
+                    if state.elapsed_s > 1 and "end" not in seen:
+                        seen["end"] = time.monotonic_ns()
+                        cameras.stop_left(how)
+                    if state.cameras["left"].gone and "closed" not in seen:
+                        seen["closed"] = time.monotonic_ns()
+
+                plan = CapturePlan(*cameras.addresses, seconds=4, preview=False)
+                capture(folder / "T", plan, watch)
+                cameras.close()
+                numbers = [n for n, _ in recorded(folder / "T" / "right.nut")[0]]
+                closed.append((seen["closed"] - seen["end"]) * 1e-9)
+                others.append(numbers[-1] - numbers[0] + 1 - len(numbers))
+        worst = max(closed)
+        print(f"{how.name}: file closed within {worst:.2f} s at most; other camera lost {others}")
+
+
 def full(arguments):
     """A small tmpfs that fills while two cameras record, with and without the reserve."""
     script = Path(__file__).resolve()
@@ -321,6 +354,7 @@ STUDIES = {
     "kill": kill,
     "flips": flips,
     "million": million,
+    "vanish": vanish,
     "full": full,
     "full-inside": full_inside,
 }

@@ -14,9 +14,9 @@ import tomlkit
 
 from olivevib import __version__
 from olivevib.calibration.boards import parse_board
-from olivevib.errors import UsageError
+from olivevib.errors import InputError, UsageError
 from olivevib.files.atomic import write_text_atomic
-from olivevib.files.capture import Camera, CameraRunner, DiskFull, open_camera
+from olivevib.files.capture import Camera, CameraRunner, open_camera
 from olivevib.marker import load_library
 from olivevib.pipeline.capture.looker import Looker
 from olivevib.pipeline.capture.plan import Captured, CapturePlan, Watch, unwatched
@@ -59,7 +59,7 @@ def capture(
         session.finish()
     session.join(tick)
     verdict = session.judge()
-    with suppress(DiskFull):
+    with suppress(InputError):  # no room: what was written at the start stays
         _write_record(folder, plan, cameras, verdict)
     there = {side: video for side, video in videos.items() if video.is_file()}
     return Captured(folder, there, verdict, session.error)
@@ -67,6 +67,9 @@ def capture(
 
 def _check(folder: Path, plan: CapturePlan) -> None:
     """Whatever can be told before a camera is touched."""
+    for name, value in (("--seconds", plan.seconds), ("--fps", plan.mode.fps)):
+        if value is not None and not value > 0:
+            raise UsageError(f"{name} {value:g} is too little.", "", "Give a number above 0.")
     for side in SIDES:
         for found in sorted(folder.glob(f"{side}*")) if folder.is_dir() else ():
             raise UsageError(

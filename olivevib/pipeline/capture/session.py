@@ -195,7 +195,7 @@ class Session:
             if runner.error is not None:
                 return runner.error
         assert self._folder is not None
-        if shutil.disk_usage(self._folder).free < self.plan.reserve_bytes:
+        if _free_bytes(self._folder) < self.plan.reserve_bytes:
             return nearly_full(self._folder, self.plan.reserve_bytes)
         return None
 
@@ -249,7 +249,7 @@ class Session:
         return (time.monotonic_ns() - self._origin_ns) * 1e-9 if self._origin_ns else 0.0
 
     def _space(self, cameras: Mapping[str, CameraState], elapsed: float) -> tuple[int, float]:
-        free = shutil.disk_usage(self._folder or Path()).free
+        free = _free_bytes(self._folder or Path())
         rate = sum(c.size_bytes for c in cameras.values()) / elapsed if elapsed > 1 else 0.0
         room = max(0, free - self.plan.reserve_bytes)
         return free, room / rate / 60 if rate > 0 else math.nan
@@ -275,6 +275,10 @@ class Session:
         while not self._stop.wait(SYNC_S):
             for runner in self.runners.values():
                 runner.sync()
+
+
+def _free_bytes(folder: Path) -> int:
+    return shutil.disk_usage(folder).free
 
 
 def nearly_full(folder: Path, reserve: int) -> InputError:
