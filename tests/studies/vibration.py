@@ -311,11 +311,11 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--trials", type=int, default=400)
     parser.add_argument("--only", default=",".join(STUDIES))
     chosen = parser.parse_args(arguments)
-    print("| goal | case | measured | reach |")  # noqa: T201
-    print("|---|---|---|---|")  # noqa: T201
+    print("| goal | case | measured | reach |")
+    print("|---|---|---|---|")
     for name in chosen.only.split(","):
         for row in STUDIES[name](chosen.trials):
-            print("| " + " | ".join(row) + " |", flush=True)  # noqa: T201
+            print("| " + " | ".join(row) + " |", flush=True)
 
 
 if __name__ == "__main__":
