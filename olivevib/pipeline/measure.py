@@ -18,6 +18,8 @@ from olivevib.trial.records.vibration import vibration_file
 from olivevib.vibration import SamplingFacts, VibrationSettings
 from olivevib.vibration import analyse as analyse_motion
 
+IMPOSSIBLE_PX = 25.0  # beyond this no bumped tripod explains the misfit: nothing is delivered
+
 
 def reconstruct(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     """Triangulate the tracks on the trial clock and write trajectory.h5."""
@@ -41,6 +43,13 @@ def reconstruct(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     result = reconstruct_tracks(
         tracks.left, tracks.right, rig, clock, corners, trial.settings.reconstruction, tick
     )
+    if result.epipolar_rms_px > IMPOSSIBLE_PX:
+        raise InputError(
+            f"the two cameras' pictures do not belong together: markers miss the epipolar lines by "
+            f"{result.epipolar_rms_px:.0f} px rms.",
+            "The recordings are swapped or the same, or the rig is that of other cameras.",
+            "Check left and right in trial.toml, and calibrate this pair as it stood.",
+        )
     write_stage(trial.folder / "trajectory.h5", trajectory_file(result, now))
     return result.cautions
 

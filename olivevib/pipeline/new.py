@@ -116,6 +116,12 @@ def _check(plan: NewTrial) -> None:
     if plan.size_mm is not None and not plan.size_mm > 0:
         raise UsageError(f"--size {plan.size_mm} is no size.", "", "Give millimetres above 0.")
     only_known(load_library(plan.markers), plan.ids)
+    if Path(plan.left).resolve() == Path(plan.right).resolve():
+        raise UsageError(
+            f"left and right are the same file, {plan.left}.",
+            "Positions in space need the pictures of two cameras.",
+            "Give the recording of each camera.",
+        )
     for path in _named(plan):
         if not path.exists():
             raise InputError(f"{path} is missing.", "", "Check the name and the folder.")

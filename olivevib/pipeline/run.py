@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from olivevib.errors import Caution, OlivevibError
+from olivevib.errors import Caution, OlivevibError, UsageError
 from olivevib.files.lock import alone_in
 from olivevib.pipeline.calibrate import calibrate
 from olivevib.pipeline.compare import compare
@@ -14,7 +14,7 @@ from olivevib.pipeline.track import track
 from olivevib.progress import Tick, silent
 from olivevib.trial import STAGES, Condition, Trial
 from olivevib.trial.fingerprints import PRIVATE
-from olivevib.trial.stages import BY_NAME, failure_file, write_failure
+from olivevib.trial.stages import BY_NAME, Stage, failure_file, write_failure
 
 Verb = Callable[[Trial, Tick], tuple[Caution, ...]]
 VERBS: Mapping[str, Verb] = {
@@ -66,6 +66,18 @@ def run(trial: Trial, tick: Tick = silent) -> Iterator[Outcome]:
         yield from _stages(trial, tick)
 
 
+def _explain_block(trial: Trial, stage: Stage) -> None:
+    """Raise what a person can do about a stage that cannot run."""
+    if "calibrate" in stage.needs and trial.states()["calibrate"].state is Condition.SKIPPED:
+        raise UsageError(
+            f"trial {trial.name} has no calibration: {stage.name} cannot run.",
+            "Neither board recordings nor a rig file are named in trial.toml.",
+            "Name them: --set calibration.left=PATH --set calibration.right=PATH "
+            "--set calibration.board=SPEC, or --set calibration.rig=FILE.",
+        )
+    trial.fingerprint(stage)  # names the input that is missing
+
+
 def _stages(trial: Trial, tick: Tick) -> Iterator[Outcome]:
     for stage in STAGES:
         trial = trial.reopen()
@@ -73,7 +85,7 @@ def _stages(trial: Trial, tick: Tick) -> Iterator[Outcome]:
         if state.state in TO_DO:
             yield Outcome(stage.name, "done", _run_stage(trial, stage.name, tick))
         elif state.state is Condition.BLOCKED:
-            trial.fingerprint(stage)  # names the input that is missing
+            _explain_block(trial, stage)
             yield Outcome(stage.name, f"blocked: {state.reason}")
         else:
             yield Outcome(stage.name, f"{state.state}: {state.reason}")

@@ -309,13 +309,22 @@ def _line(search: _Search, fit: SineFit, coloured: Floats, finding: Finding, uni
         status=finding.status,
         candidates_hz=finding.candidates_hz,
         amplitude=unknown if blind else _three(fit.amplitude[0]),
-        amplitude_sigma=unknown if blind else _three(fit.amplitude_sigma[0] * coloured),
+        amplitude_sigma=unknown if blind else _three(_amplitude_sigma(search, fit, coloured)),
         phase_rad=unknown if blind else _three(fit.phase_rad[0]),
         t_ref_s=fit.t_ref_s,
         unit=unit,
         harmonics=np.empty((0, 3)) if blind else _harmonics(fit, search.settings.harmonics),
         reasons=finding.reasons,
     )
+
+
+def _amplitude_sigma(search: _Search, fit: SineFit, coloured: Floats) -> Floats:
+    """(C,) noise, and what the exposure may take from the amplitude, which is not corrected.
+
+    An exposure E averages a sine of frequency f down by sinc(f E) at most.
+    """
+    lost = 1.0 - float(np.sinc(fit.f_hz[0] * search.facts.exposure_s))
+    return np.asarray(np.hypot(fit.amplitude_sigma[0] * coloured, lost * fit.amplitude[0]))
 
 
 def _coloured(search: _Search, fit: SineFit, sway: Floats | None) -> Floats:
