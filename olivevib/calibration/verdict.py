@@ -31,8 +31,8 @@ def _tested(e: Evidence) -> str:
     if h is None:
         return "not tested on unused frames (too few)"
     return (
-        f"on {h.frames} unused frames, distances on the board are right to {h.rms_mm:.2f} mm "
-        f"({h.rms_percent:.2f} %) rms"
+        f"on {h.frames} unused frames, distances on the board are right to {_two(h.rms_mm)} mm "
+        f"({_two(h.rms_percent)} %) rms"
     )
 
 
@@ -43,11 +43,20 @@ def _expected(rig: StereoRig, distance_mm: float, sigma_px: tuple[float, float])
     sigma = point_sigma(rig, at, sigma_px)
     half = np.array([[100.0, 0.0, 0.0]])
     length = float(length_sigma(rig, at - half, at + half)[0])
-    frame = " / ".join(f"{v:.2f}" for v in sigma.frame_mm[0])
+    frame = " / ".join(_two(v) for v in sigma.frame_mm[0])
     return (
-        f"at {distance_mm / 1000:.1f} m a length of 200 mm is right to {length:.2f} mm, and a "
-        f"board point scatters by {frame} mm in x / y / z from frame to frame"
+        f"at {distance_mm / 1000:.1f} m the calibration itself adds {_two(length)} mm (one sigma) "
+        f"to a length of 200 mm, and a board point scatters by {frame} mm in x / y / z from frame "
+        "to frame"
     )
+
+
+def _two(value: float) -> str:
+    """A number with two significant digits, never rounded to zero."""
+    if value == 0 or not np.isfinite(value):
+        return f"{value:.2f}"
+    digits = max(2, 1 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:.{digits}f}"
 
 
 def working_point(rig: StereoRig, distance_mm: float) -> Floats:
