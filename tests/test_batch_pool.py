@@ -1,7 +1,9 @@
 """Worker processes: same results however many, and what a kill, a failure or Ctrl-C costs."""
 
 import json
+import random
 import signal
+import time
 from pathlib import Path
 
 import batch_trials
@@ -10,6 +12,7 @@ import pytest
 from olivevib import pipeline
 from olivevib.batch import measure_here
 from olivevib.batch.contents import read_contents
+from olivevib.batch.unit import NOTE
 from olivevib.cli import main
 from olivevib.errors import InputError, UsageError
 from olivevib.files.lock import alone_in
@@ -123,6 +126,33 @@ def test_a_batch_ended_by_kill_9_takes_its_workers_along_and_resumes(fresh, trut
     printed, told = again.communicate(timeout=120)
     assert again.returncode == 3, told  # offset-unknown
     assert batch_trials.hashes(printed) == {"T00": truth, "T01": truth}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_whoever_is_killed_and_whenever_the_results_are_the_same(fresh, truth, tmp_path, seed):
+    trials = batch_trials.season(tmp_path, fresh, 5)
+    chance = random.Random(seed)
+    for victims in ("batch", "worker", "batch", "worker"):
+        batch = batch_trials.start(tmp_path, "--workers", 2, "--json")
+        batch_trials.wait_for(lambda b=batch: b.poll() is not None or any(map(at_work, trials)))
+        time.sleep(chance.uniform(0, 2.5))
+        workers = [w for w in map(batch_trials.holder, trials) if w]
+        if victims == "batch":
+            batch.kill()
+        elif workers:
+            batch_trials.kill(chance.choice(workers))
+            time.sleep(chance.uniform(0, 1.5))
+            batch.kill()
+        batch.communicate()
+    finished = [t for t in trials if (t / PRIVATE / NOTE).exists()]
+    results = {r.folder: r for r in measure_here(trials, 2)}
+    assert {r.hash for r in results.values()} == {truth}
+    assert all(results[str(t)].ran == () for t in finished)
+
+
+def at_work(trial: Path) -> bool:
+    return batch_trials.holder(trial) is not None
 
 
 def test_ctrl_c_tells_what_is_done(done, truth, fresh, tmp_path):
