@@ -10,6 +10,7 @@ import queue
 import socket
 import uuid
 from collections.abc import Generator, Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -85,7 +86,7 @@ def _is_here(host: str) -> bool:
 
 def _connect(address: str) -> Any:
     try:
-        import distributed
+        distributed = import_module("distributed")
     except ImportError as error:
         raise UsageError(
             "batch on a cluster needs the package distributed, which is not installed.",

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from olivevib.progress import Cancelled
 
@@ -30,9 +32,9 @@ class _Withdrawn:
     """The tick on a worker: raises Cancelled once the scheduler has taken the task back."""
 
     def __init__(self) -> None:
-        from distributed.worker import get_worker, thread_state
-
-        self._tasks, self._key = get_worker().state.tasks, thread_state.key
+        worker = import_module("distributed.worker")
+        self._tasks: Any = worker.get_worker().state.tasks
+        self._key: Any = worker.thread_state.key
         self._looked = float("-inf")
 
     def __call__(self, done: int, total: int | None, note: str) -> None:
