@@ -164,7 +164,7 @@ def test_ctrl_c_tells_what_is_done(done, truth, fresh, tmp_path):
     printed, told = batch.communicate(timeout=60)
     assert batch.returncode == 130, told
     assert batch_trials.hashes(printed) == {str(tmp_path / "a" / "T00"): truth}
-    assert "1 done" in told
+    assert "1 of 3 done, 0 failed" in told
     assert "Cancelled" in told
     assert "Traceback" not in told
     assert not batch_trials.alive(worker)
@@ -179,8 +179,7 @@ def test_failures_are_listed_with_their_remedy_and_stop_nobody(done, truth, tmp_
     printed, told = capsys.readouterr()
     assert code == 1
     assert batch_trials.hashes(printed) == {good.name: truth}
-    listed = told.split("1 done")[1]
-    assert "2 failed" in listed
+    listed = told.split("1 of 3 done, 2 failed")[1]
     assert "T01 failed" in listed
     assert "did you mean 'size_mm'" in listed
     assert "T02 failed" in listed

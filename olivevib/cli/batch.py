@@ -32,6 +32,7 @@ def batch(arguments: argparse.Namespace, console: Console) -> int:
     finally:  # also when cancelled: what is done is told
         place = {str(trial): n for n, trial in enumerate(trials)}
         results.sort(key=lambda r: place[r.folder])
+        _count(results, len(trials), console)
         _print(results, _names(trials), arguments.json)
         _tell(results, _names(trials), console)
     if any(r.failed for r in results):
@@ -77,11 +78,17 @@ def _facts(result: TrialResult, name: str) -> dict[str, Any]:
     }
 
 
+def _count(results: Sequence[TrialResult], total: int, console: Console) -> None:
+    failed = sum(r.failed for r in results)
+    idle = sum(not r.failed and not r.ran for r in results)
+    told = f" ({idle} up to date before)" if idle else ""
+    console.say(f"{len(results) - failed} of {total} done{told}, {failed} failed")
+
+
 def _tell(results: Sequence[TrialResult], names: dict[str, str], console: Console) -> None:
-    """Each warning with its trials, how many are done, and every failure with its remedy."""
-    good = [r for r in results if not r.failed]
+    """Each warning with its trials, and every failure with its remedy."""
     warned: dict[str, list[str]] = {}
-    for result in good:
+    for result in results:
         for code in dict.fromkeys(c.code for c in result.cautions):
             warned.setdefault(code, []).append(names[result.folder])
     for code, trials in warned.items():
@@ -89,9 +96,7 @@ def _tell(results: Sequence[TrialResult], names: dict[str, str], console: Consol
         console.say(f"warning [{code}]: {', '.join(trials[:NAMED])}{more}")
     if warned:
         console.say("    Texts and remedies: olivevib show TRIAL")
-    idle = sum(not r.ran for r in good)
-    told = f" ({idle} up to date before)" if idle else ""
-    failed = [r for r in results if r.failed]
-    console.say(f"{len(good)} done{told}, {len(failed)} failed")
-    for result in failed:
-        console.error(f"{names[result.folder]} failed: {result.what}", result.why, result.remedy)
+    for result in results:
+        if result.failed:
+            what = f"{names[result.folder]} failed: {result.what}"
+            console.error(what, result.why, result.remedy)
