@@ -1,6 +1,6 @@
 """Batch in figures: what it adds to a trial, what a second worker gains, memory, resuming.
 
-    PYTHONPATH=tests python tests/studies/batch_scaling.py [--trials 1000] [--kills 3]
+    PYTHONPATH=tests python tests/studies/batch_scaling.py [added gained resumed] [--trials 1000]
 
 Makes small trials in a temporary folder (two markers, 400 x 300 px). Needs Linux (/proc).
 """
@@ -26,19 +26,24 @@ from olivevib.trial.fingerprints import PRIVATE
 BATCH = (sys.executable, "-m", "olivevib", "batch", "-q", "--json")
 LONG_FRAMES = 90
 ROUNDS = 3
+GAINED = 16  # trials, so that starting the workers weighs little
 
 
 def main() -> None:
     parser = argparse.ArgumentParser()
+    parser.add_argument("parts", nargs="*", default=["added", "gained", "resumed"])
     parser.add_argument("--trials", type=int, default=1000, help="tiny trials to resume")
     parser.add_argument("--kills", type=int, default=3, help="how often the batch is killed")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="olivevib_batch_") as folder:
         place = Path(folder)
         print(f"load of the machine before: {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores")
-        added(place)
-        gained(place)
-        resumed(place, arguments.trials, arguments.kills)
+        if "added" in arguments.parts:
+            added(place)
+        if "gained" in arguments.parts:
+            gained(place)
+        if "resumed" in arguments.parts:
+            resumed(place, arguments.trials, arguments.kills)
 
 
 def added(place: Path) -> None:
@@ -62,7 +67,7 @@ def gained(place: Path) -> None:
     found = set()
     for _ in range(ROUNDS):
         for workers, times in seconds.items():
-            batch_trials.season(place / "gained", trial, 8)
+            batch_trials.season(place / "gained", trial, GAINED)
             before = cpu_s()
             batch, rows = run(place / "gained", workers)
             work[workers].append(round(cpu_s() - before, 1))
@@ -71,7 +76,9 @@ def gained(place: Path) -> None:
             shutil.rmtree(place / "gained")
     ratios = [one / two for one, two in zip(seconds[1], seconds[2], strict=True)]
     words = " / ".join(f"{ratio:.2f}" for ratio in ratios)
-    print(f"two workers against one, 8 trials: {words} (median {statistics.median(ratios):.2f})")
+    print(
+        f"two workers against one, {GAINED} trials: {words} (median {statistics.median(ratios):.2f})"
+    )
     print(f"  seconds with one {seconds[1]}, with two {seconds[2]}; {len(found)} result hash")
     idle = 2 * statistics.median(work[1]) / statistics.median(work[2])
     print(f"  processor seconds {work[1]} and {work[2]}: {idle:.2f} where nobody else needs a core")
