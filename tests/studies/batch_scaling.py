@@ -74,7 +74,7 @@ def gained(place: Path) -> None:
             times.append(round(batch.seconds, 1))
             found |= {row["hash"] for row in rows}
             shutil.rmtree(place / "gained")
-    ratios = [one / two for one, two in zip(seconds[1], seconds[2], strict=True)]
+    ratios = [round(one / two, 2) for one, two in zip(seconds[1], seconds[2], strict=True)]
     words = " / ".join(f"{ratio:.2f}" for ratio in ratios)
     print(
         f"two workers against one, {GAINED} trials: {words} (median {statistics.median(ratios):.2f})"
