@@ -189,7 +189,7 @@ def test_pickles_and_bombs_are_refused(tmp_path: Path) -> None:
         (b"\x89HDF\r\n\x1a\n", "-v7"),
         (b"TDSm", "TDMS"),
         (b"\x1f\x8b\x08", "gzip"),
-        (b"\x1a\x45\xdf\xa3" + b"\x00" * 20 + b"mide", "idelib"),
+        (b"\x1a\x45\xdf\xa3" + b"\x00" * 20 + b"mide", "IDE"),
     ],
 )
 def test_known_formats_that_are_not_read_are_named(tmp_path: Path, head: bytes, word: str) -> None:
