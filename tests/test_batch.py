@@ -85,7 +85,7 @@ def test_time_left_rests_on_trials_that_had_something_to_do():
     outlook.started("/s/T1")
     outlook.started("/s/T2")
     clock[0] = 60.0
-    outlook.finished(TrialResult("/s/T1", "00", ("track",)))
+    outlook.finished(TrialResult("/s/T1", "00", ("track",), seconds=60.0))
     outlook.started("/s/T3")
     # T2 is due, T3 takes 60 s, T4 and T5 wait: 180 s of work for two workers
     assert outlook.seconds_left() == pytest.approx(90.0)
@@ -98,7 +98,7 @@ def test_time_left_of_the_last_trial_is_that_of_one_worker():
     outlook.started("/s/T0")
     outlook.started("/s/T1")
     clock[0] = 40.0
-    outlook.finished(TrialResult("/s/T0", "00", ("track",)))
+    outlook.finished(TrialResult("/s/T0", "00", ("track",), seconds=40.0))
     outlook.interrupted("/s/T1")
     assert outlook.seconds_left() == pytest.approx(40.0)
 

@@ -1,8 +1,10 @@
 """A real Dask scheduler and workers on loopback: the same hashes, also with a worker killed."""
 
+import json
 import os
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import batch_trials
@@ -38,18 +40,23 @@ def truth(fresh, tmp_path_factory) -> str:
 @pytest.fixture(scope="module")
 def scheduler(tmp_path_factory) -> str:
     """The address of a scheduler with two workers of one thread."""
-    place = tmp_path_factory.mktemp("dask")
+    with cluster(tmp_path_factory.mktemp("dask"), 2) as (address, _):
+        yield address
+
+
+@contextmanager
+def cluster(place: Path, workers: int):
+    """A scheduler and its workers: its address and its process."""
     told = place / "scheduler.json"
-    programs = [
-        daemon(place, "dask_scheduler", "--scheduler-file", told, "--port", 0, "--no-dashboard"),
-        daemon(place, "dask_worker", "--scheduler-file", told, "--nworkers", 2, "--nthreads", 1),
-    ]
+    one = ("--scheduler-file", told)
+    head = daemon(place, "dask_scheduler", *one, "--port", 0, "--no-dashboard")
+    hands = daemon(place, "dask_worker", *one, "--nworkers", workers, "--nthreads", 1)
     try:
-        yield batch_trials.wait_for(lambda: address(told))
+        yield batch_trials.wait_for(lambda: address_in(told)), head.pid
     finally:
-        for program in reversed(programs):
+        for program in (hands, head):
             program.terminate()
-            program.wait(30)
+            program.wait(60)
 
 
 def daemon(place: Path, name: str, *arguments: object) -> subprocess.Popen:
@@ -64,9 +71,7 @@ def daemon(place: Path, name: str, *arguments: object) -> subprocess.Popen:
         )
 
 
-def address(file: Path) -> str:
-    import json
-
+def address_in(file: Path) -> str:
     try:
         return json.loads(file.read_text())["address"]
     except (OSError, ValueError):
@@ -89,7 +94,7 @@ def test_a_cluster_measures_the_same_with_a_worker_killed(fresh, truth, schedule
     assert sorted(r.folder for r in results) == [str(t) for t in trials]
     assert {r.hash for r in results} == {truth}, [r.what for r in results]
     assert ticks[-1][:2] == (5, 5)
-    assert any("2 workers" in note for _, _, note in ticks)
+    assert any(" left; 2 at work" in note for _, _, note in ticks)
 
 
 def test_a_failure_on_the_cluster_is_a_result(fresh, truth, scheduler, tmp_path):
@@ -121,6 +126,22 @@ def test_the_command_prints_the_same_lines(fresh, truth, scheduler, tmp_path):
     printed, told = batch.communicate(timeout=120)
     assert batch.returncode == 3, told
     assert batch_trials.hashes(printed) == {"T00": truth, "T01": truth}
+
+
+def test_a_lost_scheduler_is_one_error_and_what_is_done_is_kept(fresh, truth, tmp_path):
+    trials = batch_trials.season(tmp_path / "season", fresh, 3)
+    results = []
+    with cluster(tmp_path, 1) as (address, head):
+
+        def tick(done, total, note):
+            if done == 1 and batch_trials.alive(head):
+                batch_trials.kill(head)
+
+        with pytest.raises(InputError, match="the scheduler is gone") as caught:
+            results.extend(measure_on_cluster(trials, address, tick))
+    assert "run the same command" in caught.value.remedy
+    assert results[0].hash == truth
+    assert len(results) < 3
 
 
 def test_where_no_scheduler_answers_it_says_how_to_start_one(tmp_path):

@@ -6,10 +6,12 @@ Whoever reaches a scheduler without TLS can run any code on its workers; so it i
 from __future__ import annotations
 
 import ipaddress
+import logging
 import queue
 import socket
 import uuid
 from collections.abc import Generator, Iterator, Sequence
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,7 @@ from olivevib.progress import Tick, silent
 
 POLL_S = 0.25
 ANSWERS_S = 10
+NOBODY = "no worker is connected yet"
 START = (
     "Start one: dask scheduler --host 127.0.0.1, then a worker a core: "
     "dask worker ADDRESS --nworkers 2 --nthreads 1"
@@ -45,7 +48,8 @@ def measure_on_cluster(
     try:
         yield from _results(client, [str(t) for t in trials], tick)
     finally:
-        client.close()
+        with suppress(OSError):
+            client.close()
 
 
 def check_address(address: str) -> None:
@@ -95,12 +99,11 @@ def _connect(address: str) -> Any:
         ) from error
     scheme, host, port = _parts(address)
     try:
-        if (
-            scheme == "tls"
-            and not distributed.Security().get_connection_args("client")["ssl_context"]
-        ):
+        if scheme == "tls" and not _has_certificates(distributed.Security()):
             raise _no_certificates(address)
         socket.create_connection((host, port), ANSWERS_S).close()
+        # what it would log with tracebacks, a person gets in words
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL + 1)
         return distributed.Client(address, timeout=ANSWERS_S, set_as_default=False)
     except (OSError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(f"no scheduler answers at {address}.", f"{error}", START) from error
@@ -119,45 +122,64 @@ def _no_certificates(address: str) -> UsageError:
     )
 
 
+def _gone(why: str) -> InputError:
+    return InputError(
+        "the scheduler is gone.",
+        why,
+        "What is done is kept. Start it and its workers again, and run the same command.",
+    )
+
+
 def _results(client: Any, trials: list[str], tick: Tick) -> Iterator[TrialResult]:
     inbox: queue.Queue[Any] = queue.Queue()
-    outlook = Outlook(len(trials), len(trials))
-    batch = uuid.uuid4().hex
-    futures = {}
-    for number, trial in enumerate(trials):
-        key = f"{Path(trial).name}-{batch}-{number}"
-        futures[key] = client.submit(measure_remotely, trial, key=key, pure=False)
-    by_key = dict(zip(futures, trials, strict=True))
-    for future in futures.values():
-        future.add_done_callback(inbox.put)
+    outlook = Outlook(len(trials), 1)
+    futures = _submit(client, trials, inbox)
     try:
         while outlook.left:
-            outlook.note(_who_works(client))
+            outlook.workers = _workers(client)
+            outlook.note(f"{outlook.workers} at work" if outlook.workers else NOBODY)
             tick(*outlook.progress())
             try:
                 future = inbox.get(timeout=POLL_S)
             except queue.Empty:
                 continue
-            result = _result(future, by_key[future.key])
+            result = _result(future, futures[future.key][0])
             del futures[future.key]
             outlook.finished(result)
             yield result
         tick(*outlook.progress())
     finally:
-        client.cancel(list(futures.values()))
+        with suppress(OSError):  # the scheduler is gone
+            client.cancel([future for _, future in futures.values()])
 
 
-def _who_works(client: Any) -> str:
-    count = len(client.nthreads())
-    return f"{count} worker{'s' * (count != 1)}" if count else "no worker is connected yet"
+def _submit(client: Any, trials: list[str], inbox: queue.Queue[Any]) -> dict[str, tuple[str, Any]]:
+    """Hand in every trial: key -> trial and future, which comes into ``inbox`` when it is done."""
+    batch = uuid.uuid4().hex
+    futures = {}
+    for number, trial in enumerate(trials):
+        key = f"{Path(trial).name}-{batch}-{number}"
+        future = client.submit(measure_remotely, trial, key=key, pure=False)
+        future.add_done_callback(inbox.put)
+        futures[key] = trial, future
+    return futures
+
+
+def _workers(client: Any) -> int:
+    try:
+        return len(client.nthreads())
+    except OSError as error:
+        raise _gone(str(error)) from error
 
 
 def _result(future: Any, trial: str) -> TrialResult:
     if future.status == "finished":
         return TrialResult.from_json(future.result())
+    if future.status != "error":
+        raise _gone("It has let go of the trials it was given.")
     try:
-        reason = str(future.exception()) if future.status == "error" else "the scheduler was lost"
-    except Exception as error:  # an answer that cannot even be read here
+        reason = str(future.exception())
+    except Exception as error:  # what was raised there cannot even be read here
         reason = str(error)
     return TrialResult.failure(
         trial,

@@ -13,7 +13,8 @@ class Outlook:
     """Counts trials and times those that were really measured; ``now`` is a clock in seconds."""
 
     def __init__(self, total: int, workers: int, now: Callable[[], float] = time.monotonic) -> None:
-        self._total, self._workers, self._now = total, workers, now
+        self._total, self._now = total, now
+        self.workers = workers
         self._done = 0
         self._running: dict[str, float] = {}  # trial -> when it started
         self._measured: list[float] = [0.0, 0.0]  # how many, and how long all of them together
@@ -44,10 +45,10 @@ class Outlook:
     def finished(self, result: TrialResult) -> None:
         """A trial is through; only one that had something to do tells how long one takes."""
         self._done += 1
-        started = self._running.pop(result.folder, None)
-        if started is not None and result.ran:
+        self._running.pop(result.folder, None)
+        if result.ran:
             self._measured[0] += 1
-            self._measured[1] += self._now() - started
+            self._measured[1] += result.seconds
 
     def progress(self) -> tuple[int, int, str]:
         """Arguments of a tick: trials through, all trials, time left and what is going on."""
@@ -63,7 +64,7 @@ class Outlook:
         each, now = together / count, self._now()
         begun = sum(max(each - (now - start), 0.0) for start in self._running.values())
         waiting = self.left - len(self._running)
-        return (begun + each * waiting) / max(1, min(self._workers, self.left))
+        return (begun + each * waiting) / max(1, min(self.workers, self.left))
 
 
 def _words(seconds: float) -> str:

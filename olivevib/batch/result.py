@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 from olivevib.errors import Caution, OlivevibError
 
@@ -13,7 +13,8 @@ class TrialResult:
     """One trial of a batch: done with its result hash, or failed with what, why and remedy.
 
     folder: absolute. ran: the stages (and "report") that were not up to date. cautions: all
-    warnings of the trial, also those of earlier runs.
+    warnings of the trial, also those of earlier runs. seconds: how long it took; no part of the
+    result.
     """
 
     folder: str
@@ -23,6 +24,7 @@ class TrialResult:
     what: str = ""
     why: str = ""
     remedy: str = ""
+    seconds: float = field(default=0.0, compare=False)
 
     @property
     def failed(self) -> bool:

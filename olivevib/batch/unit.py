@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,8 +37,10 @@ def measure(folder: Path, tick: Tick = silent) -> TrialResult:
     Whatever goes wrong is in the result: one trial never stops the others. Only what the tick
     raises (Cancelled) comes through; finished stages are kept then.
     """
+    started = time.monotonic()
     try:
-        return _measure(Trial.open(folder), tick)
+        result = _measure(Trial.open(folder), tick)
+        return replace(result, seconds=time.monotonic() - started)
     except Cancelled:
         raise
     except OlivevibError as error:
