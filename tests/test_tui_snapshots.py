@@ -12,6 +12,7 @@ import pytest
 import tui_scene as scene
 from pytest_textual_snapshot import SVGImageExtension
 from small_videos import make_video
+from textual.widgets import Input
 from tui_app import press, settle, started
 
 from olivevib.errors import InputError
@@ -66,6 +67,14 @@ def svg(snapshot):
     return snapshot.use_extension(SVGImageExtension)
 
 
+async def taken(app, pilot) -> str:
+    """A picture of the app, with the cursors at rest."""
+    for field in app.screen.query(Input):
+        field.cursor_blink = False
+    await settle(pilot)
+    return app.export_screenshot()
+
+
 def name_of(picture: str, size: tuple[int, int]) -> str:
     return f"{picture} {size[0]}x{size[1]}"
 
@@ -76,7 +85,7 @@ async def test_every_screen_looks_as_it_did(svg, workspace, size):
     async with started(workspace, size) as (app, pilot):
         for picture, keys in WALK:
             await press(pilot, *keys.split())
-            if app.export_screenshot() != svg(name=name_of(picture, size)):
+            if await taken(app, pilot) != svg(name=name_of(picture, size)):
                 changed.append(picture)
     assert not changed
 
@@ -89,19 +98,19 @@ async def test_work_errors_and_an_empty_folder(svg, workspace, tmp_path, monkeyp
         await press(pilot, "down", "down", "enter")
         app.progress = Progress("2026-11-21_T06: run", "tracking markers", 450, 1800, 31.0, 43.5)
         await settle(pilot)
-        if app.export_screenshot() != svg(name=name_of("busy", size)):
+        if await taken(app, pilot) != svg(name=name_of("busy", size)):
             changed.append("busy")
         app.progress = None
         faults = "  markers.size: there is no such key; did you mean 'size_mm'?\n  [b]: no markup"
         app.show_error(InputError("trial.toml has 2 fault(s):", faults, "Correct the file."))
         await settle(pilot)
-        if app.export_screenshot() != svg(name=name_of("error", size)):
+        if await taken(app, pilot) != svg(name=name_of("error", size)):
             changed.append("error")
     (tmp_path / "new").mkdir()
     monkeypatch.chdir(tmp_path / "new")
     monkeypatch.setattr("olivevib.tui.screens.trials.whole_path", lambda path: "/home/ana/olive")
     async with started(workspace, size) as (app, pilot):
-        if app.export_screenshot() != svg(name=name_of("empty", size)):
+        if await taken(app, pilot) != svg(name=name_of("empty", size)):
             changed.append("empty")
     assert not changed
 
@@ -112,12 +121,12 @@ async def test_sunlight_and_no_colour(svg, workspace, monkeypatch):
     async with started(workspace) as (app, pilot):
         for picture, keys in (("trials", "l"), ("trial", "enter"), ("orbits", "v")):
             await press(pilot, *keys.split())
-            if app.export_screenshot() != svg(name=f"sunlight {picture}"):
+            if await taken(app, pilot) != svg(name=f"sunlight {picture}"):
                 changed.append(picture)
     shutil.rmtree(workspace / ".olivevib")
     monkeypatch.setenv("NO_COLOR", "1")
     async with started(workspace) as (app, pilot):
         await press(pilot, "enter", "v", "2", "right")
-        if app.export_screenshot() != svg(name="without colour"):
+        if await taken(app, pilot) != svg(name="without colour"):
             changed.append("without colour")
     assert not changed
