@@ -43,14 +43,15 @@ def season(folder: Path, trial: Path, count: int) -> list[Path]:
     return trials
 
 
-def start(*arguments: object) -> subprocess.Popen:
-    """``olivevib batch`` as a process of its own, which Ctrl-C reaches wherever the tests run."""
+def start(*arguments: object, verb: str = "batch", **environment: str) -> subprocess.Popen:
+    """A verb of olivevib as a process of its own, which Ctrl-C reaches wherever the tests run."""
     return subprocess.Popen(
-        [sys.executable, "-c", HEARS_CTRL_C, "batch", *map(str, arguments)],
+        [sys.executable, "-c", HEARS_CTRL_C, verb, *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         cwd=ROOT,
+        env=os.environ | environment,
     )
 
 

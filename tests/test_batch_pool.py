@@ -1,7 +1,9 @@
 """Worker processes: same results however many, and what a kill, a failure or Ctrl-C costs."""
 
 import json
+import os
 import random
+import shutil
 import signal
 import time
 from pathlib import Path
@@ -12,11 +14,13 @@ import pytest
 from olivevib import pipeline
 from olivevib.batch import measure_here
 from olivevib.batch.contents import read_contents
+from olivevib.batch.remote import _measured
 from olivevib.batch.unit import NOTE
 from olivevib.cli import main
 from olivevib.errors import InputError, UsageError
 from olivevib.files.lock import alone_in
-from olivevib.progress import Cancelled
+from olivevib.progress import Cancelled, silent
+from olivevib.threads import uses_one_thread
 from olivevib.trial import Trial
 from olivevib.trial.fingerprints import PRIVATE
 
@@ -55,6 +59,45 @@ def test_one_worker_two_workers_and_no_worker_measure_the_same(fresh, truth, tmp
     assert ticks[-1][:2] == (3, 3)
     assert any("tracking markers" in note for _, _, note in ticks)
     assert any(" left; " in note for _, _, note in ticks)
+
+
+@pytest.mark.slow
+def test_run_with_many_threads_and_batch_calibrate_the_same(tmp_path):
+    ran, batched = (recordings(tmp_path / verb) for verb in ("run", "batch"))
+    many = {"OMP_NUM_THREADS": "4", "OPENBLAS_NUM_THREADS": "4"}
+    run = batch_trials.start(ran, verb="run", **many)
+    batch = batch_trials.start(batched, "--workers", 1)
+    for program in (run, batch):
+        _, told = program.communicate(timeout=300)
+        assert program.returncode in (0, 3), told
+    assert read_contents(Trial.open(ran)) == read_contents(Trial.open(batched))
+
+
+def recordings(folder: Path) -> Path:
+    """The sample trial as it was recorded: nothing measured yet."""
+    sample = batch_trials.ROOT / "trials" / "sample"
+    left_out = shutil.ignore_patterns("*.h5", "rig.toml", "report.html", PRIVATE)
+    return shutil.copytree(sample, folder, ignore=left_out)
+
+
+def test_every_verb_computes_with_one_thread(monkeypatch, capsys):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "8")
+    monkeypatch.setenv("OMP_NUM_THREADS", "8")
+    assert not uses_one_thread(os.environ)
+    assert main(["markers", "list"]) == 0
+    assert uses_one_thread(os.environ)
+
+
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_a_cluster_worker_with_many_threads_lets_a_process_measure(
+    done, truth, tmp_path, monkeypatch, threads
+):
+    (trial,) = batch_trials.season(tmp_path, done, 1)
+    holders = set()
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", threads)
+    monkeypatch.setattr("olivevib.batch.unit.use_one_core", lambda: holders.add("here"))
+    assert _measured(trial, silent).hash == truth
+    assert holders == ({"here"} if threads == "1" else set())
 
 
 @pytest.mark.slow

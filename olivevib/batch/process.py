@@ -17,12 +17,9 @@ from typing import Any
 
 import olivevib
 from olivevib.batch.worker import STOP
+from olivevib.threads import use_one_thread
 
 STOPS_IN_S = 10.0  # a stage without a tick takes less; then the process is ended by force
-ONE_THREAD = (
-    *("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"),
-    *("VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS"),
-)
 
 
 @dataclass(frozen=True)
@@ -110,7 +107,9 @@ def _environment() -> dict[str, str]:
     """One thread for every numeric library, and this very olivevib."""
     here = str(Path(olivevib.__file__).resolve().parents[1])
     paths = os.pathsep.join(p for p in (here, os.environ.get("PYTHONPATH")) if p)
-    return os.environ | dict.fromkeys(ONE_THREAD, "1") | {"PYTHONPATH": paths}
+    environment = os.environ | {"PYTHONPATH": paths}
+    use_one_thread(environment)
+    return environment
 
 
 def _words(code: int) -> str:

@@ -2,30 +2,45 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from olivevib.progress import Cancelled
+from olivevib.batch.pool import measure_here
+from olivevib.batch.result import TrialResult
+from olivevib.progress import Cancelled, Tick
+from olivevib.threads import uses_one_thread
 
 _ONE_TRIAL = threading.Lock()  # a worker with several threads measures one trial at a time
 _LOOKS_S = 0.5
 
 
 def measure_remotely(trial: str) -> str:
-    """The task that a worker runs: one trial; the result as JSON."""
-    from olivevib.batch.unit import measure, use_one_core
+    """The task that a worker runs: one trial; the result as JSON.
 
+    In this process where it computes with one thread, as Dask's own set-up has it; else in a
+    process of its own, so that the result is the same to the last bit.
+    """
     watch = _Withdrawn()
-    use_one_core()
     while not _ONE_TRIAL.acquire(timeout=_LOOKS_S):
         watch(0, None, "")
     try:
-        return measure(Path(trial), watch).to_json()
+        return _measured(Path(trial), watch).to_json()
     finally:
         _ONE_TRIAL.release()
+
+
+def _measured(trial: Path, watch: Tick) -> TrialResult:
+    if uses_one_thread(os.environ):
+        from olivevib.batch.unit import measure, use_one_core
+
+        use_one_core()
+        return measure(trial, watch)
+    (result,) = measure_here([trial], 1, watch)
+    return result
 
 
 class _Withdrawn:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from olivevib.cli.parser import build_parser
+from olivevib.threads import use_one_thread
 
 if TYPE_CHECKING:
     from olivevib.cli.console import Console
@@ -20,6 +22,7 @@ DONE, FAILED, WRONG_USE, DONE_WITH_WARNINGS, CANCELLED = 0, 1, 2, 3, 130
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code (0, 1, 2, 3 or 130)."""
     arguments = build_parser().parse_args(argv)
+    use_one_thread(os.environ)  # before a verb loads numpy
     from olivevib.cli.console import Console
 
     console = Console(sys.stderr, quiet=arguments.quiet)
