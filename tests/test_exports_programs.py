@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import time
 from pathlib import Path
 from typing import Any
 
@@ -264,12 +263,3 @@ def test_a_trajectory_that_saw_nothing_is_written(to: str) -> None:
     if to == "dxf":
         document = ezdxf.read(io.StringIO(data.decode()))  # type: ignore[attr-defined]
         assert not list(document.modelspace())
-
-
-@pytest.mark.parametrize("to", ALWAYS)
-def test_twelve_markers_and_a_minute_are_quick(to: str) -> None:
-    trajectory = make_trajectory(1800, ids=tuple(range(1, 13)))
-    exported(make_trajectory(), to)  # loads the format's library
-    start = time.process_time()
-    exported(trajectory, to)
-    assert time.process_time() - start < (6 if to == "dxf" else 2)  # twice the aim, on any machine
