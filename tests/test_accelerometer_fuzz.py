@@ -183,6 +183,8 @@ def test_pickles_and_bombs_are_refused(tmp_path: Path) -> None:
         read_accelerometer(tmp_path / "bomb.npz")
 
 
+@pytest.mark.filterwarnings("ignore::ResourceWarning")  # idelib leaves a damaged file open
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize(
     ("head", "word"),
     [
