@@ -79,6 +79,8 @@ def gained(place: Path) -> None:
     print(
         f"two workers against one, {GAINED} trials: {words} (median {statistics.median(ratios):.2f})"
     )
+    best = min(seconds[1]) / min(seconds[2])
+    print(f"  least disturbed run of each: {best:.2f}")
     print(f"  seconds with one {seconds[1]}, with two {seconds[2]}; {len(found)} result hash")
     idle = 2 * statistics.median(work[1]) / statistics.median(work[2])
     print(f"  processor seconds {work[1]} and {work[2]}: {idle:.2f} where nobody else needs a core")
