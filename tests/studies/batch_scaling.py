@@ -75,10 +75,7 @@ def gained(place: Path) -> None:
             found |= {row["hash"] for row in rows}
             shutil.rmtree(place / "gained")
     ratios = [round(one / two, 2) for one, two in zip(seconds[1], seconds[2], strict=True)]
-    words = " / ".join(f"{ratio:.2f}" for ratio in ratios)
-    print(
-        f"two workers against one, {GAINED} trials: {words} (median {statistics.median(ratios):.2f})"
-    )
+    print(f"two workers against one, {GAINED} trials: {statistics.median(ratios):.2f} of {ratios}")
     best = min(seconds[1]) / min(seconds[2])
     print(f"  least disturbed run of each: {best:.2f}")
     print(f"  seconds with one {seconds[1]}, with two {seconds[2]}; {len(found)} result hash")
