@@ -6,7 +6,7 @@ Source: paper, section 3.3.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -180,13 +180,14 @@ class FrameTimes:
 
 
 def assemble(
-    camera: str, frames: Sequence[Sequence[Detection]], times: FrameTimes, ids: Sequence[int]
+    camera: str, frames: Iterable[Sequence[Detection]], times: FrameTimes, ids: Sequence[int]
 ) -> list[Track]:
     """Tracks of the wanted ids from the detections of each delivered frame.
 
-    frames: one list a delivered frame, in order. A count that the camera skipped is a row with
-    state dropped; a frame that would not decode is damaged; where a marker is missing it is
-    outside (it left at the border), hidden, or after LOST_AFTER_S lost.
+    frames: one list a delivered frame, in order; they are taken one by one, never kept. A count
+    that the camera skipped is a row with state dropped; a frame that would not decode is damaged;
+    where a marker is missing it is outside (it left at the border), hidden, or after LOST_AFTER_S
+    lost.
     """
     sequence = times.fit.sequence
     rows = int(sequence[-1]) + 1
@@ -194,49 +195,53 @@ def assemble(
     base = np.full(rows, int(State.DROPPED), np.int64)
     base[sequence] = int(State.LOST)
     base[sequence[sorted(times.damaged)]] = int(State.DAMAGED)
-    by_id: dict[int, dict[int, Detection]] = {i: {} for i in ids}
+    by_id = {i: _Rows(base) for i in ids}
     for row, detections in zip(sequence.tolist(), frames, strict=True):
         for d in detections:
             if d.id in by_id:
-                by_id[d.id][row] = d
-    return [
-        _track(camera, i, by_id[i], frame_t_s + times.start_s, base, times) for i in sorted(by_id)
-    ]
+                by_id[d.id].put(row, d)
+    return [by_id[i].track(camera, i, frame_t_s + times.start_s, times) for i in sorted(by_id)]
 
 
-def _track(
-    camera: str,
-    marker: int,
-    found: Mapping[int, Detection],
-    frame_t_s: Floats,
-    base: Ints,
-    times: FrameTimes,
-) -> Track:
-    n = frame_t_s.size
-    raw_row, centre = np.full(n, np.nan), np.full((n, 2), np.nan)
-    corners, corners_cov = np.full((n, 4, 2), np.nan), np.full((n, 8, 8), np.nan)
-    centre_cov = np.full((n, 2, 2), np.nan)
-    state = base.copy()
-    for row, d in found.items():
-        raw_row[row], centre[row], corners[row] = d.raw_row[0], d.centre_px, d.corners_px
-        centre_cov[row], corners_cov[row] = d.centre_cov_px2, d.corners_cov_px2
-        state[row] = State.FLAGGED if d.flags else State.SEEN
-    _explain_gaps(state, corners, frame_t_s, times.size_px)
-    row_or_middle = np.where(np.isfinite(raw_row), raw_row, times.size_px[1] / 2)
-    return Track(
-        camera=camera,
-        id=marker,
-        frame=np.arange(n),
-        t_s=frame_t_s + times.row_time_s * row_or_middle,
-        raw_row=raw_row,
-        corners_px=corners,
-        corners_cov_px2=corners_cov,
-        centre_px=centre,
-        centre_cov_px2=centre_cov,
-        exposure_s=np.full(n, times.exposure_s),
-        state=state,
-        localiser=next(iter(found.values())).localiser if found else "",
-    )
+class _Rows:
+    """The rows of one marker while its frames come in."""
+
+    def __init__(self, base: Ints) -> None:
+        n = base.size
+        self.state = base.copy()
+        self.values = {
+            "raw_row": np.full(n, np.nan),
+            "corners_px": np.full((n, 4, 2), np.nan),
+            "corners_cov_px2": np.full((n, 8, 8), np.nan),
+            "centre_px": np.full((n, 2), np.nan),
+            "centre_cov_px2": np.full((n, 2, 2), np.nan),
+        }
+        self.localiser = ""
+
+    def put(self, row: int, d: Detection) -> None:
+        """Keep what one frame showed."""
+        for name, values in self.values.items():
+            values[row] = d.raw_row[0] if name == "raw_row" else getattr(d, name)
+        self.state[row] = State.FLAGGED if d.flags else State.SEEN
+        self.localiser = self.localiser or d.localiser
+
+    def track(self, camera: str, marker: int, frame_t_s: Floats, times: FrameTimes) -> Track:
+        """The finished track; the arrays are handed over, not copied."""
+        _explain_gaps(self.state, self.values["corners_px"], frame_t_s, times.size_px)
+        raw_row = self.values["raw_row"]
+        row_or_middle = np.where(np.isfinite(raw_row), raw_row, times.size_px[1] / 2)
+        for values in self.values.values():
+            values.flags.writeable = False
+        return Track(
+            camera=camera,
+            id=marker,
+            frame=np.arange(frame_t_s.size),
+            t_s=frame_t_s + times.row_time_s * row_or_middle,
+            exposure_s=np.full(frame_t_s.size, times.exposure_s),
+            state=self.state,
+            localiser=self.localiser,
+            **self.values,
+        )
 
 
 def _explain_gaps(state: Ints, corners: Floats, t_s: Floats, size_px: tuple[int, int]) -> None:

@@ -67,11 +67,11 @@ class Variable:
 
 
 def _plain(values: NDArray[Any]) -> NDArray[Any]:
-    """A copy as float64, int64, bool or str; raises ValueError for anything else."""
+    """As float64, int64, bool or str, copied unless read-only; ValueError for anything else."""
     wanted: dict[str, Any] = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}
     kind = values.dtype.kind
     if kind in wanted:
-        return values.astype(wanted[kind])
+        return values.astype(wanted[kind], copy=values.flags.writeable)
     if kind == "U" or (kind == "O" and all(isinstance(v, str) for v in values.flat)):
         return values.astype(np.str_)
     raise ValueError(f"cannot be stored: values of type {values.dtype}")

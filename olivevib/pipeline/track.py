@@ -46,15 +46,17 @@ def track(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     journal = Journal.open(trial.folder / PRIVATE / "track.journal", key)
     try:
         notes = _measure(trial, library, infos, journal, tick)
-        seen = {side: [unpack(row) for row in _payloads(journal, side)] for side in SIDES}
+        seen = {side: partial(_seen, journal, side) for side in SIDES}
+        empty = [side for side in SIDES if not any(s.detections for s in seen[side]())]
+        notes += tuple(c for side in empty for c in _if_mirrored(trial, library, side))
+        stored = stored_tracks(trial, library, infos, seen, notes)
     finally:
         journal.close()
-    empty = [side for side in SIDES if not any(s.detections for s in seen[side])]
-    notes += tuple(c for side in empty for c in _if_mirrored(trial, library, side))
-    stored = stored_tracks(trial, library, infos, seen, notes)
-    write_stage(trial.folder / "tracks.h5", tracks_file(stored, now))
+    cautions, file = stored.cautions, tracks_file(stored, now)
+    del stored  # the file holds its own columns: memory for one of them is enough
+    write_stage(trial.folder / "tracks.h5", file)
     journal.remove()
-    return stored.cautions
+    return cautions
 
 
 def _if_mirrored(trial: Trial, library: MarkerLibrary, side: str) -> Iterator[Caution]:
@@ -146,9 +148,10 @@ def _observe(frame: Frame, tracker: Tracker) -> FrameObservations:
     return FrameObservations(frame.stamp_s, False, tuple(found))
 
 
-def _payloads(journal: Journal, side: str) -> Iterator[bytes]:
+def _seen(journal: Journal, side: str) -> Iterator[FrameObservations]:
+    """What every frame of one camera showed, one by one from the disk."""
     for row in journal.rows(side):
-        yield row.payload
+        yield unpack(row.payload)
 
 
 def _info(trial: Trial, side: str) -> VideoInfo:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,37 +19,36 @@ from olivevib.tracking import FrameTimes, Track, assemble
 from olivevib.trial import Trial
 from olivevib.trial.records.tracks import CameraRecord, StoredTracks
 
+Seen = Callable[[], Iterator[FrameObservations]]  # the frames of one camera, from the first
+
 STRAY_FRAMES = 3  # an id seen in fewer frames of both cameras is a stray reading, not a marker
 STRAY_SHARE = 0.05
 
 
 @dataclass(frozen=True)
 class _Recorded:
-    """One camera: what its file says and what was seen in every delivered frame."""
+    """One camera: what its file says and what its frames showed; ``seen`` reads them anew.
+
+    frames: how many were delivered; damaged: indices of those that would not decode; counts: in
+    how many frames each id was seen.
+    """
 
     side: str
     info: VideoInfo
-    seen: list[FrameObservations]
+    seen: Seen
+    frames: int
+    damaged: frozenset[int]
+    counts: Mapping[int, int]
     stamps: Floats
     stamp_kind: str
     fit: StampFit
-
-    @property
-    def damaged(self) -> frozenset[int]:
-        """Indices of the frames that would not decode."""
-        return frozenset(k for k, s in enumerate(self.seen) if s.damaged)
-
-    def counts(self) -> dict[int, int]:
-        """In how many frames each id was seen."""
-        ids = [d.id for s in self.seen for d in s.detections]
-        return {int(i): int(n) for i, n in zip(*np.unique(ids, return_counts=True), strict=True)}
 
 
 def stored_tracks(
     trial: Trial,
     library: MarkerLibrary,
     infos: dict[str, VideoInfo],
-    seen: dict[str, list[FrameObservations]],
+    seen: Mapping[str, Seen],
     notes: tuple[Caution, ...] = (),
 ) -> StoredTracks:
     """Tracks of both cameras on their own clocks, with the record of each recording.
@@ -60,7 +61,8 @@ def stored_tracks(
     tracks = {side: _tracks(trial, recorded, side, ids) for side in SIDES}
     localisers = sorted({t.localiser for side in SIDES for t in tracks[side] if t.localiser})
     counts = check_counts(
-        {side: len(seen[side]) for side in SIDES}, {side: recorded[side].fit for side in SIDES}
+        {side: recorded[side].frames for side in SIDES},
+        {side: recorded[side].fit for side in SIDES},
     )
     return StoredTracks(
         left=tracks["left"],
@@ -73,14 +75,21 @@ def stored_tracks(
     )
 
 
-def _recorded(trial: Trial, side: str, info: VideoInfo, seen: list[FrameObservations]) -> _Recorded:
+def _recorded(trial: Trial, side: str, info: VideoInfo, seen: Seen) -> _Recorded:
     camera = getattr(trial.settings.cameras, side)
     file = trial.path(camera.stamps) if camera.stamps else None
-    container = [s.stamp_s for s in seen]
+    container, damaged, counts = [], [], Counter[int]()
+    for index, frame in enumerate(seen()):
+        container.append(frame.stamp_s)
+        counts.update(d.id for d in frame.detections)
+        if frame.damaged:
+            damaged.append(index)
     stamps, kind, fit = stamps_of(file, trial.path(camera.video), container)
     if kind == "container" and info.container.startswith("avi"):
         kind = "slots"  # AVI has no stamps of its own: the frame's number times the rate
-    return _Recorded(side, info, seen, stamps, kind, fit)
+    return _Recorded(
+        side, info, seen, len(container), frozenset(damaged), dict(counts), stamps, kind, fit
+    )
 
 
 def _markers(
@@ -89,8 +98,8 @@ def _markers(
     """The ids to track and the stray ones: seen, but too rarely to be a marker of this trial."""
     if declared is not None:
         return declared, ()
-    counts = [camera.counts() for camera in cameras]
-    least = [max(STRAY_FRAMES, STRAY_SHARE * len(camera.seen)) for camera in cameras]
+    counts = [camera.counts for camera in cameras]
+    least = [max(STRAY_FRAMES, STRAY_SHARE * camera.frames) for camera in cameras]
     ids = sorted(set(counts[0]) | set(counts[1]))
     kept = [i for i in ids if any(c.get(i, 0) >= n for c, n in zip(counts, least, strict=True))]
     return tuple(kept), tuple(i for i in ids if i not in kept)
@@ -111,7 +120,7 @@ def _tracks(
         size_px=me.info.size_px,
         damaged=me.damaged,
     )
-    return tuple(assemble(side, [s.detections for s in me.seen], times, ids))
+    return tuple(assemble(side, (s.detections for s in me.seen()), times, ids))
 
 
 def _record(trial: Trial, camera: _Recorded) -> CameraRecord:
@@ -120,7 +129,7 @@ def _record(trial: Trial, camera: _Recorded) -> CameraRecord:
         video=getattr(trial.settings.cameras, camera.side).video,
         codec=camera.info.codec,
         size_px=camera.info.size_px,
-        frames=len(camera.seen),
+        frames=camera.frames,
         dropped=int(camera.fit.dropped.size),
         damaged=len(camera.damaged),
         stamp_kind=camera.stamp_kind,
@@ -146,7 +155,7 @@ def _cautions(
     cameras: list[_Recorded], ids: tuple[int, ...], declared: tuple[int, ...] | None
 ) -> tuple[Caution, ...]:
     out = []
-    counts = [camera.counts() for camera in cameras]
+    counts = [camera.counts for camera in cameras]
     if not any(counts):
         out.append(
             Caution(

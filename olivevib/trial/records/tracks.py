@@ -90,7 +90,9 @@ def _side(side: str, tracks: tuple[Track, ...], stamp_s: Floats) -> dict[str, Va
 
     def stack(name: str, *rest: int) -> Floats:
         values = [getattr(t, name) for t in tracks]
-        return np.stack(values, axis=1) if values else np.empty((n, 0, *rest))
+        out = np.stack(values, axis=1) if values else np.empty((n, 0, *rest))
+        out.flags.writeable = False  # handed over, not copied
+        return out
 
     fm = ("frame", "marker")
     out = {
