@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from olivevib.errors import Caution, InputError
 from olivevib.files.store import write_stage
 from olivevib.geometry import StereoRig
@@ -15,7 +17,7 @@ from olivevib.trial import Trial
 from olivevib.trial.records.tracks import StoredTracks
 from olivevib.trial.records.trajectory import trajectory_file
 from olivevib.trial.records.vibration import vibration_file
-from olivevib.vibration import SamplingFacts, VibrationSettings
+from olivevib.vibration import Line, SamplingFacts, Vibration, VibrationSettings
 from olivevib.vibration import analyse as analyse_motion
 
 IMPOSSIBLE_PX = 25.0  # beyond this no bumped tripod explains the misfit: nothing is delivered
@@ -119,6 +121,36 @@ def sampling_facts(trial: Trial, clock: TrialClock) -> SamplingFacts:
     )
 
 
+def _unproven(result: Vibration) -> Vibration:
+    """The analysis without sigmas of amplitudes, and with a caution that says why.
+
+    Above half the frame rate, cameras out of step by an unknown time mix depth and motion: the
+    scatter of the samples then tells nothing of the amplitude's error.
+    """
+
+    def bare(line: Line) -> Line:
+        return replace(line, amplitude_sigma=np.full(3, np.nan))
+
+    return replace(
+        result,
+        table=tuple(replace(row, line=bare(row.line)) for row in result.table),
+        spectra={
+            quantity: replace(spectrum, lines=tuple(bare(line) for line in spectrum.lines))
+            for quantity, spectrum in result.spectra.items()
+        },
+        cautions=(
+            *result.cautions,
+            Caution(
+                "amplitude-unproven",
+                "Amplitudes may be wrong several times over: the lines may lie above half the "
+                "frame rate and the time offset between the cameras is not known.",
+                "Let board and trial be one recording, or state reconstruction.right_offset_ms; "
+                "or declare the machine's band (--band) where it lies below half the frame rate.",
+            ),
+        ),
+    )
+
+
 def analyse(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     """Spectra, lines with their status and the figures of every marker; writes vibration.h5."""
     now = trial.fingerprint("analyse")
@@ -130,5 +162,7 @@ def analyse(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     settings = VibrationSettings(window=trial.settings.vibration.window)
     facts = sampling_facts(trial, reconstruction.clock)
     result = analyse_motion(motion, facts, settings, tick=tick)
+    if reconstruction.clock.source == "unknown" and not facts.direct:
+        result = _unproven(result)
     write_stage(trial.folder / "vibration.h5", vibration_file(result, now))
     return result.cautions

@@ -190,9 +190,10 @@ def _cautions(rms: float, clock: TrialClock, trajectory: Trajectory) -> tuple[Ca
         out.append(
             Caution(
                 "offset-unknown",
-                "The time offset between the cameras is not known and was taken as zero.",
-                "Each millisecond out of step gives false depth while the marker moves; use one "
-                "recording for board and trial, or state reconstruction.right_offset_ms.",
+                "The time offset between the cameras is not known and was taken as zero; no sigma "
+                "includes what that may cost while a marker moves (at 25 Hz and 3 mm each "
+                "millisecond out of step is about 1.5 mm of false depth).",
+                "Use one recording for board and trial, or state reconstruction.right_offset_ms.",
             )
         )
     if rms > EPIPOLAR_LIMIT_PX:
