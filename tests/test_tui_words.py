@@ -15,11 +15,13 @@ from rich.cells import cell_len
 
 from olivevib.errors import InputError, UsageError
 from olivevib.progress import Cancelled
+from olivevib.tui.app import OlivevibApp
 from olivevib.tui.harmless import REPLACEMENT, harmless, plain
 from olivevib.tui.kept import Kept, place_of, read_kept, write_kept
 from olivevib.tui.loader import Quality, StageLine, TrialRow
 from olivevib.tui.plan import FIELDS, guesses, plan_of, trial_name
 from olivevib.tui.screens.error import error_text
+from olivevib.tui.themes import palette_of
 from olivevib.tui.views.palette import Palette
 from olivevib.tui.views.progress import Progress
 from olivevib.tui.views.setting_rows import SettingRow, change_of, setting_rows, typed
@@ -303,3 +305,12 @@ def test_the_first_picture_waits_for_nothing_heavy():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
     assert found == []
+
+
+def test_every_theme_gives_plot_styles():
+    themes = OlivevibApp(Path()).available_themes
+    assert {"olive-dark", "sunlight", "ansi-dark"} <= set(themes)
+    for theme in themes.values():
+        palette = palette_of(theme)
+        assert palette.accent.bold
+        assert palette.good != palette.bad != palette.warn

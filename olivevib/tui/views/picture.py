@@ -14,7 +14,7 @@ from textual.strip import Strip
 from olivevib.arrays import Floats, Grey, floats
 
 QUADRANTS = " ▗▖▄▝▐▞▟▘▚▌▙▀▜▛█"  # bits: 8 upper left, 4 upper right, 2 lower left, 1 lower right
-LEVELS = 24  # grey levels on screen: fewer bytes a frame, no visible step
+LEVELS = 16  # grey levels on screen: a real 720p frame stays below 90 kB
 
 
 @dataclass(frozen=True)
