@@ -217,6 +217,27 @@ def _result_verbs(verbs: Any) -> None:
     check.add_argument("trial", metavar="TRIAL")
 
 
+_STUDY = """\
+without a NAME: the list. Prints tables, and keeps them with charts: NAME.md, NAME.json, NAME-*.svg.
+exit code 3: measured, and something that is asked for was not reached.
+"""
+
+
+def _study_verbs(verbs: Any) -> None:
+    kinds = {
+        "paper": "the experiments of the paper of 2011, reproduced",
+        "benchmark": "speed and accuracy beside other libraries, in one run",
+    }
+    for name, help_ in kinds.items():
+        study = _add(verbs, name, f"studies:{name}", help_, _STUDY)
+        study.add_argument("name", nargs="?", metavar="NAME", help="which one")
+        study.add_argument("--effort", type=float, default=1.0, metavar="X", help=_EFFORT)
+        study.add_argument("--seed", type=int, default=1, metavar="N")
+        study.add_argument("--json", action="store_true", help="for programs")
+        study.add_argument("-o", dest="output", metavar="DIR", help=f"default: reports/{name}")
+
+
+_EFFORT = "times the number of samples that the goals ask for (0.05: a first look)"
 _LAMP = """\
 Let an LED flash at a known frequency, such as 500 Hz (no multiple of half the frame rate), through
 paper right before the lens, with an exposure of less than half a flash. Record some seconds with
@@ -241,5 +262,6 @@ def _other_verbs(verbs: Any) -> None:
     rowtime.add_argument("file", metavar="FILE", help="a recording of the lamp")
     rowtime.add_argument("--led", type=float, required=True, metavar="HZ", help="flashes a second")
     rowtime.add_argument("--camera", metavar="NAME", help="whose it is, where the file cannot say")
+    _study_verbs(verbs)
     doctor = _add(verbs, "doctor", "doctor:doctor", "what works on this machine")
     doctor.add_argument("--json", action="store_true", help="for programs")

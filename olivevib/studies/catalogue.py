@@ -1,0 +1,46 @@
+"""The studies by name: what each measures, and the function that does it (loaded when asked)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+
+from olivevib.errors import UsageError
+from olivevib.studies.study import StudyFunction
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One study: its name on the command line, a line on what it measures, module:function."""
+
+    name: str
+    what: str
+    function: str
+
+    def load(self) -> StudyFunction:
+        """The function; UsageError where a package that it compares with is not installed."""
+        module, function = self.function.split(":")
+        try:
+            found: StudyFunction = getattr(import_module(f"olivevib.studies.{module}"), function)
+        except ModuleNotFoundError as error:
+            raise UsageError(
+                f"{self.name} needs the package {error.name}, which is not installed.",
+                "It compares olivevib with other libraries.",
+                "Install what the tests need: pip install 'olivevib[test]'",
+            ) from error
+        return found
+
+
+PAPER: tuple[Entry, ...] = ()
+BENCHMARKS: tuple[Entry, ...] = ()
+
+
+def find(kind: tuple[Entry, ...], name: str) -> Entry:
+    """The study of this name, or of the only one that begins so; UsageError otherwise."""
+    hits = [entry for entry in kind if entry.name == name] or [
+        entry for entry in kind if entry.name.startswith(name)
+    ]
+    if len(hits) != 1:
+        names = ", ".join(entry.name for entry in kind)
+        raise UsageError(f"{name!r} is no study.", "", f"Name one of: {names}.")
+    return hits[0]
