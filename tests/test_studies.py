@@ -4,8 +4,21 @@ import numpy as np
 import pytest
 
 from olivevib.errors import UsageError
-from olivevib.studies import BENCHMARKS, PAPER, Chart, Curve, Effort, Entry, Goal, Study, Table
-from olivevib.studies import as_json, as_text, find, write_study
+from olivevib.studies import (
+    BENCHMARKS,
+    PAPER,
+    Chart,
+    Curve,
+    Effort,
+    Entry,
+    Goal,
+    Study,
+    Table,
+    as_json,
+    as_text,
+    find,
+    write_study,
+)
 
 
 @pytest.fixture
