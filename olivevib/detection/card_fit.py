@@ -26,6 +26,7 @@ ELONGATED_PX2 = 0.3  # difference of the blur's two variances that is a motion
 MOTION_ROUNDS = 3
 BEYOND = 0.25  # image sizes by which a marker's card may leave the image
 WIDEST_PX = 900.0  # of a marker's card
+SHARP = Blur()  # of a good lens in focus
 
 
 @dataclass(frozen=True)
@@ -37,8 +38,10 @@ class CardFit:
     uneven: bool = False
 
 
-def fit_card(grey: Grey, white: Singles, H: Floats, layout: MarkerLayout) -> CardFit | None:
-    """Fit a card to the image from pose H (3, 3), centred modules to px.
+def fit_card(
+    grey: Grey, white: Singles, H: Floats, layout: MarkerLayout, blur: Blur = SHARP
+) -> CardFit | None:
+    """Fit a card to the image from pose H (3, 3), centred modules to px, and a blur to start with.
 
     None where it does not fit: no contrast, outside the image, lost.
     """
@@ -48,7 +51,6 @@ def fit_card(grey: Grey, white: Singles, H: Floats, layout: MarkerLayout) -> Car
     pixels = marker_pixels(grey, H, layout.modules, stride)
     if pixels is None:
         return None
-    blur = Blur()
     found = approach(draw_template(white, H, blur, layout.quiet, COARSE), pixels)
     one = None if found is None else _fine(grey, white, layout, found[0], _rounder(blur, found[1]))
     if one is not None and one.fit.rms <= EVEN * one.fit.gain:

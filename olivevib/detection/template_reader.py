@@ -18,7 +18,7 @@ from olivevib.detection.hypotheses import Frames, frame_hypotheses, joined
 from olivevib.detection.refine import Fit, fitted_points
 from olivevib.detection.settings import DetectionSettings
 from olivevib.detection.softcode import SoftMatch, SoftReader
-from olivevib.detection.template import card
+from olivevib.detection.template import Blur, card
 from olivevib.geometry import apply_homography
 from olivevib.marker import MarkerLibrary
 
@@ -36,7 +36,7 @@ FAR_CODES = 12 / 49  # distance of codes from which the whole drawing tells them
 
 
 @dataclass(frozen=True)
-class _Found:
+class Found:
     """One fitted marker: its row in the library, pose as printed, fit and wrong modules."""
 
     row: int
@@ -61,7 +61,7 @@ class TemplateReader:
         bits, apart = library.layout.code**2, library.distance
         self._wrong = [min(round(most * bits / 49), (apart - 1) // 2) for most in WRONG]
         self._far = apart >= FAR_CODES * bits
-        self._cards = [
+        self.cards = [
             card(library.layout.pattern(code), library.layout.quiet) for code in library.codes
         ]
 
@@ -74,7 +74,7 @@ class TemplateReader:
         """
         found: dict[int, Detection] = {}
         for one in self._fitted(grey, self._hypotheses(grey)):
-            new = self._detection(one)
+            new = self.detection(one)
             kept = found.get(new.id)
             if kept is None or new.size_px > kept.size_px:
                 found[new.id] = new
@@ -97,35 +97,37 @@ class TemplateReader:
         layout = self.library.layout
         return joined([frame_hypotheses(fine_bars(dark), layout) for dark in dark_passes(grey)])
 
-    def _fitted(self, grey: Grey, frames: Frames) -> list[_Found]:
+    def _fitted(self, grey: Grey, frames: Frames) -> list[Found]:
         """Accepted markers; of several fits of one code at one place the first stands."""
         if not len(frames):
             return []
         H = frames.homographies()
         match = self._soft.match(grey, H)
         modules = self.library.layout.modules
-        found: list[_Found] = []
+        found: list[Found] = []
         places = np.empty((0, 2))
         for k in _order(frames, match, self.library.layout.code):
             near = max(3.0, NEAR_SIZES * modules * float(np.linalg.norm(frames.a[k])))
             if (((places - frames.centre[k]) ** 2).sum(axis=1) < near * near).any():
                 continue
             code = (int(match.row[k]), int(match.turn[k]), int(match.wrong[k]))
-            one = self._fit(grey, H[k], code)
+            one = self.fit(grey, H[k], code)
             if one is not None:
                 found.append(one)
                 places = np.vstack([places, one.H[:2, 2] / one.H[2, 2]])
         return found
 
-    def _fit(self, grey: Grey, H: Floats, code: tuple[int, int, int]) -> _Found | None:
-        """Fit the drawing of a code (row, turn, wrong modules) and accept or refuse it.
+    def fit(
+        self, grey: Grey, H: Floats, code: tuple[int, int, int], blur: Blur | None = None
+    ) -> Found | None:
+        """Fit the drawing of a code (row, turn, wrong modules) from pose H; accept or refuse it.
 
         It is accepted where it reads as itself again, or, blurred beyond reading, where the whole
         drawing agrees with the image as no other code's could.
         """
         row, turn, first_wrong = code
         start = _turned(H, turn)
-        card_fit = fit_card(grey, self._cards[row], start, self.library.layout)
+        card_fit = fit_card(grey, self.cards[row], start, self.library.layout, blur or Blur())
         if card_fit is None:
             return None
         fit = card_fit.fit
@@ -137,9 +139,10 @@ class TemplateReader:
         clear = read and wrong <= self._wrong[fit.weight < COVERED]
         if not clear and not (self._far and fit.whole_ncc >= SURE):
             return None
-        return _Found(row, fit.H, card_fit, wrong if read else first_wrong)
+        return Found(row, fit.H, card_fit, wrong if read else first_wrong)
 
-    def _detection(self, one: _Found) -> Detection:
+    def detection(self, one: Found) -> Detection:
+        """What is said of a fitted marker."""
         fit = one.card.fit
         points = np.vstack([np.zeros((1, 2)), self.library.layout.cornerstones])
         px, covariance = fitted_points(fit, points)
