@@ -245,6 +245,35 @@ olivevib capture. Stripes must travel over the picture.
 """
 
 
+def _plan_verb(verbs: Any) -> None:
+    help_ = "what these cameras can measure, before the trial"
+    parser = _add(verbs, "plan", "plan:plan", help_, _PLAN_MORE)
+    numbers = (
+        ("--fps", 30.0, "N", "frames a second"),
+        ("--readout", None, "MS", "from the first row to the last; 0: global shutter"),
+        ("--offset", None, "MS", "how much later the right camera exposes; 0: in step"),
+        ("--marker", 60.0, "MM", _SIZE),
+        ("--distance", 1400.0, "MM", "from the cameras to the tree"),
+        ("--frequency", None, "HZ", "of the machine (default: the whole band)"),
+        ("--amplitude", 3.0, "MM", "peak displacement that is expected (3)"),
+        ("--exposure", 2.0, "MS", "exposure time (2)"),
+        ("--focal-px", 950.0, "PX", "focal length in pixels (950)"),
+        ("--baseline", 420.0, "MM", "distance between the cameras (420)"),
+        ("--seconds", 10.0, "S", "length of steady shaking (10)"),
+    )
+    for name, default, unit, more in numbers:
+        parser.add_argument(name, type=float, default=default, metavar=unit, help=more)
+    parser.add_argument("--rows", type=int, default=720, metavar="N", help="picture height (720)")
+    parser.add_argument("--band", metavar="5-45", help="where the shaker's frequency may lie, Hz")
+    parser.add_argument("--json", action="store_true", help="everything, for programs")
+
+
+_PLAN_MORE = """\
+statuses: direct (no alias exists), confirmable (sampling times will decide), ambiguous (candidates
+will remain), blind (no amplitude). What is not given counts as unknown, never as good.
+"""
+
+
 def _other_verbs(verbs: Any) -> None:
     demo = _add(verbs, "demo", "simulated:demo", "a simulated trial, measured, against its truth")
     demo.add_argument("dir", nargs="?", metavar="DIR", help="a new folder (default: demo)")
@@ -262,6 +291,7 @@ def _other_verbs(verbs: Any) -> None:
     rowtime.add_argument("file", metavar="FILE", help="a recording of the lamp")
     rowtime.add_argument("--led", type=float, required=True, metavar="HZ", help="flashes a second")
     rowtime.add_argument("--camera", metavar="NAME", help="whose it is, where the file cannot say")
+    _plan_verb(verbs)
     _study_verbs(verbs)
     doctor = _add(verbs, "doctor", "doctor:doctor", "what works on this machine")
     doctor.add_argument("--json", action="store_true", help="for programs")

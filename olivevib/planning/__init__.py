@@ -1,0 +1,8 @@
+"""Before a trial: what these cameras, markers and frequencies will let one measure."""
+
+from olivevib.planning.advice import advice
+from olivevib.planning.outlook import Outlook, outlook
+from olivevib.planning.setup import Setup
+from olivevib.planning.zones import Zone, zone_of, zones
+
+__all__ = ["Outlook", "Setup", "Zone", "advice", "outlook", "zone_of", "zones"]
