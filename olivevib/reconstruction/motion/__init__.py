@@ -1,0 +1,31 @@
+"""The continuous-time motion of markers, seen row by row, and its true frequency."""
+
+from olivevib.reconstruction.motion.fit import fit_motion
+from olivevib.reconstruction.motion.observe import observe
+from olivevib.reconstruction.motion.types import (
+    Anchor,
+    BranchTable,
+    MarkerMotion,
+    MarkerSightings,
+    Motion,
+    MotionFit,
+    MotionSettings,
+    Observations,
+    Sightings,
+    Timing,
+)
+
+__all__ = [
+    "Anchor",
+    "BranchTable",
+    "MarkerMotion",
+    "MarkerSightings",
+    "Motion",
+    "MotionFit",
+    "MotionSettings",
+    "Observations",
+    "Sightings",
+    "Timing",
+    "fit_motion",
+    "observe",
+]
