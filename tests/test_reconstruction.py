@@ -1,5 +1,7 @@
 """Triangulation against truth and sampling; pairing in time; the naive path kept as the paper's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from olivevib.geometry import CameraModel, StereoRig, rotation_from_vector
 from olivevib.reconstruction import (
     ReconstructionSettings,
     TrialClock,
+    clock_from_motion,
     linear_eigen,
     reconstruct,
     triangulate,
@@ -191,3 +194,40 @@ def test_the_dataframe_has_the_columns_of_the_export():
     ]
     assert len(table) == 5
     assert table["state"].tolist() == ["seen"] * 5
+
+
+def hand_pushed(t: float) -> np.ndarray:
+    a = 2 * np.pi * t / 7.0 + 0.3 * np.sin(0.9 * t)
+    return np.array([300 * np.cos(a), 120 * np.sin(a), 1400 + 90 * np.sin(a)])
+
+
+def late_tracks(motion, late_s: float, row_time_s: float, noise: float) -> tuple[Track, Track]:
+    """Both cameras at 30 frames/s, the right one late by that much at row 0, unknown to it."""
+    t = np.arange(240) / 30
+    left = track("left", t, motion, row_time_s, noise)
+    right = track("right", t + late_s, motion, row_time_s, noise)
+    return left, replace(right, t_s=right.t_s - late_s)
+
+
+@pytest.mark.parametrize("late_s", [0.002, -0.011, 0.140])
+def test_slow_motion_tells_the_offset_between_the_cameras(late_s):
+    left, right = late_tracks(hand_pushed, late_s, 2.8e-5, 0.05)
+    clock = clock_from_motion(
+        [left], [right], rig(), TrialClock(left_row_time_s=2.8e-5, right_row_time_s=2.8e-5)
+    )
+    assert clock.source == "slow motion"
+    assert clock.right_offset_s == pytest.approx(late_s, abs=4 * clock.right_offset_sigma_s)
+    assert clock.right_offset_sigma_s < 3e-4
+
+
+def test_motion_that_the_frames_do_not_follow_tells_no_offset():
+    def fast(t: float) -> np.ndarray:
+        return hand_pushed(t) + np.array([0, 4 * np.sin(2 * np.pi * 24.0 * t), 0])
+
+    left, right = late_tracks(fast, 0.004, 0.0, 0.05)
+    assert clock_from_motion([left], [right], rig(), TrialClock()).source == "unknown"
+
+
+def test_a_marker_at_rest_tells_no_offset():
+    left, right = late_tracks(lambda _: np.array([50.0, 20, 1400]), 0.004, 0.0, 0.05)
+    assert clock_from_motion([left], [right], rig(), TrialClock()).source == "unknown"

@@ -10,14 +10,15 @@ from olivevib.errors import Caution, InputError
 from olivevib.files.store import write_stage
 from olivevib.geometry import StereoRig
 from olivevib.pipeline.libraries import corners_mm, trial_library
+from olivevib.pipeline.motions import marker_motion, surveyed
 from olivevib.progress import Tick, silent
-from olivevib.reconstruction import TrialClock
+from olivevib.reconstruction import TrialClock, clock_from_motion
 from olivevib.reconstruction import reconstruct as reconstruct_tracks
 from olivevib.trial import Trial
 from olivevib.trial.records.tracks import StoredTracks
 from olivevib.trial.records.trajectory import trajectory_file
 from olivevib.trial.records.vibration import vibration_file
-from olivevib.vibration import Line, SamplingFacts, Vibration, VibrationSettings
+from olivevib.vibration import Line, Phase, SamplingFacts, Vibration, VibrationSettings
 from olivevib.vibration import analyse as analyse_motion
 
 IMPOSSIBLE_PX = 25.0  # beyond this no bumped tripod explains the misfit: nothing is delivered
@@ -42,6 +43,8 @@ def reconstruct(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
         )
     corners = {i: corners_mm(library, trial.settings, i) for i in sorted(ids)}
     clock = trial_clock(trial, tracks)
+    if clock.source == "unknown" and not trial.settings.reconstruction.paper:
+        clock = clock_from_motion(tracks.left, tracks.right, rig, clock)
     result = reconstruct_tracks(
         tracks.left, tracks.right, rig, clock, corners, trial.settings.reconstruction, tick
     )
@@ -158,11 +161,14 @@ def analyse(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     if reconstruction is None:
         raise trial.need("reconstruct")
     trajectory = reconstruction.trajectory
-    motion = {int(i): trajectory.samples(int(i)) for i in trajectory.ids}
+    motion, cautions = marker_motion(trial, trajectory)
     settings = VibrationSettings(window=trial.settings.vibration.window)
     facts = sampling_facts(trial, reconstruction.clock)
-    result = analyse_motion(motion, facts, settings, tick=tick)
+    phases = [Phase(*row) for row in trial.settings.vibration.phases] or None
+    result = analyse_motion(motion, facts, settings, phases, tick)
+    result = replace(result, cautions=(*result.cautions, *cautions))
     if reconstruction.clock.source == "unknown" and not facts.direct:
         result = _unproven(result)
+    result = replace(result, survey=surveyed(trial, trajectory, motion, result, facts))
     write_stage(trial.folder / "vibration.h5", vibration_file(result, now))
     return result.cautions

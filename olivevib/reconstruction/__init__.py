@@ -7,6 +7,7 @@ from olivevib.reconstruction.reconstruct import (
     reconstruct,
 )
 from olivevib.reconstruction.trajectory import ContinuousFit, Trajectory
+from olivevib.reconstruction.trial_offset import clock_from_motion
 from olivevib.reconstruction.triangulation import linear_eigen, triangulate
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "ReconstructionSettings",
     "Trajectory",
     "TrialClock",
+    "clock_from_motion",
     "linear_eigen",
     "reconstruct",
     "triangulate",

@@ -20,7 +20,9 @@ class TrialClock:
     """Offset between the cameras and the row times, each with its sigma and its source.
 
     right_offset_s is minus the lag tau of the calibration (tau > 0: the right camera is late).
-    source: "declared", "calibration" (the same recording), "trial", or "unknown" (taken as zero).
+    source: "declared", "calibration" (the same recording), "slow motion" or "fit" (of the trial
+    itself), "unknown" (taken as zero). right_drift: rate error of the right camera's clock, s/s;
+    the offset then holds at ``drift_from_s`` of that clock.
     """
 
     right_offset_s: float = 0.0
@@ -29,8 +31,11 @@ class TrialClock:
     source: str = "unknown"
     left_row_time_s: float = 0.0
     right_row_time_s: float = 0.0
+    right_drift: float = 0.0
+    drift_from_s: float = 0.0
 
     def right_times(self, t_s: Floats) -> Floats:
         """Trial times of the right camera's observations from its own clock (``Track.t_s``)."""
         rows = self.reference_row * (self.left_row_time_s - self.right_row_time_s)
-        return np.asarray(t_s + (self.right_offset_s + rows), dtype=np.float64)
+        late = self.right_offset_s + rows + self.right_drift * (t_s - self.drift_from_s)
+        return np.asarray(t_s + late, dtype=np.float64)

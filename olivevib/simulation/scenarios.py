@@ -181,10 +181,11 @@ RELEASE = replace(
 TOY_CARS = replace(
     DEMO,
     name="toy-cars",
-    title="two toy cars with markers 4 and 6 on closed tracks (paper, section 6.3), 10 s",
+    title="two toy cars on closed tracks (paper, 6.3): rolling shutters, cameras 2 ms apart, 10 s",
     what=ToyCars(),
     band_hz=None,
     markers=MarkerPlan(ids=(4, 6), size_mm=(85.0, 85.0)),
+    cameras=CameraPlan(right=Clock(offset_s=0.002), row_time_s=(27.8e-6, 26.9e-6)),
     light=LightPlan(leaves=200, blur_px=6.0),
     sensor=None,
 )

@@ -61,6 +61,8 @@ def _clock(clock: TrialClock) -> dict[str, float | str]:
         "source": clock.source,
         "left_row_time_s": clock.left_row_time_s,
         "right_row_time_s": clock.right_row_time_s,
+        "right_drift": clock.right_drift,
+        "drift_from_s": clock.drift_from_s,
     }
 
 
