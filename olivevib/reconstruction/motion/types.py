@@ -12,7 +12,7 @@ pi(exp(r) R0 p + t0 + x). Source: knowledge of the field, sampling time (CONVENT
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf, nan
 from typing import TypeAlias
 
@@ -297,7 +297,7 @@ class MotionFit:
     start_s: float
     end_s: float
     shift_s: float = 0.0
-    psi: Floats = np.empty(0)
+    psi: Floats = field(default_factory=lambda: np.empty(0))
     psi_first_s: float = 0.0
     psi_knot_s: float = 0.5
     growth: float = 0.0
