@@ -78,7 +78,8 @@ def _trajectory(folder: Path, settings: TrialSettings) -> dict[str, Path]:
 
 
 def _compare(folder: Path, settings: TrialSettings) -> dict[str, Path]:
-    files = {a.file: resolve(folder, a.file) for a in settings.accelerometers}
+    names = [n for a in settings.accelerometers for n in (a.file, a.preset) if n]
+    files = {name: resolve(folder, name) for name in names}
     return _trajectory(folder, settings) | files
 
 
@@ -97,6 +98,7 @@ def _settings(settings: TrialSettings, stage: Stage) -> dict[str, Any]:
     } | {"cameras.shutter": whole["cameras"]["shutter"]}
     markers = whole["markers"]
     sizes = {m["id"]: m["size_mm"] for m in markers["marker"] if m["size_mm"]}
+    fixed = settings.markers.at("fixed")
     table = {
         "calibrate": cameras | _keyed("calibration", whole["calibration"], _FILE_KEYS),
         "track": cameras
@@ -104,8 +106,9 @@ def _settings(settings: TrialSettings, stage: Stage) -> dict[str, Any]:
         | _keyed("detection", whole["detection"], ()),
         "reconstruct": {"markers.size_mm": markers["size_mm"], "markers.marker.size_mm": sizes}
         | _keyed("reconstruction", whole["reconstruction"], ()),
-        "analyse": _keyed("vibration", whole["vibration"], ()),
-        "compare": {"accelerometers": whole["accelerometers"]},
+        "analyse": _keyed("vibration", whole["vibration"], ())
+        | {"markers on the trunk": settings.markers.at("trunk"), "fixed markers": fixed},
+        "compare": {"accelerometers": whole["accelerometers"], "fixed markers": fixed},
     }
     return {key: value for key, value in table[stage.name].items() if value is not None}
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import datetime
+from itertools import pairwise
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from olivevib.detection import DetectionSettings
 from olivevib.reconstruction import ReconstructionSettings
+from olivevib.vibration import Phase
 
 Place = Literal["trunk", "branch", "twig", "fixed"]
 Positive = Field(default=None, gt=0)
@@ -85,6 +87,10 @@ class Markers(Section):
         """Where one marker was fixed, or None."""
         return next((m.place for m in self.marker if m.id == marker), None)
 
+    def at(self, place: Place) -> tuple[int, ...]:
+        """The ids of the markers that were fixed there, ascending."""
+        return tuple(sorted(m.id for m in self.marker if m.place == place))
+
 
 class Camera(Section):
     """One recording; row_time_us is signed, per raw sensor row."""
@@ -128,9 +134,14 @@ class CalibrationInputs(Section):
 
 
 class Accelerometer(Section):
-    """One sensor file, the marker it was fixed to, and how to read it."""
+    """One sensor file, the marker it was fixed to, and how to read it.
+
+    lever_mm: where it sat, from the marker's centre in the marker's axes. preset: TOML file of
+    options kept from an earlier trial; what stands beside it here goes before it.
+    """
 
     file: str
+    preset: str | None = None
     marker: int | None = Field(default=None, ge=0)
     axes: tuple[str, ...] = ()
     lever_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -143,11 +154,41 @@ class Accelerometer(Section):
     start: str | None = None
 
 
+class Motion(Section):
+    """A motion to analyse beside the markers' own: of a point of a body, or against another marker.
+
+    at_mm: the point, from the marker's centre in its own axes (x right, y down as printed, z into
+    the surface). relative_to: the marker whose motion is taken out.
+    """
+
+    name: str = ""
+    marker: int = Field(ge=0)
+    relative_to: int | None = Field(default=None, ge=0)
+    at_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
 class Vibration(Section):
-    """band_hz: where the shaker's lines may lie; empty: 5 to 45 Hz, and nobody declared it."""
+    """band_hz: where the shaker's lines may lie; empty: 5 to 45 Hz, and nobody declared it.
+
+    phases: (name, start s, end s) on the trial clock, in place of those found. reference: the
+    marker that the others are compared with; empty: the first on the trunk, or the first.
+    """
 
     band_hz: tuple[float, float] | None = None
     window: str = "hann"
+    phases: tuple[tuple[str, float, float], ...] = ()
+    reference: int | None = Field(default=None, ge=0)
+    motion: tuple[Motion, ...] = ()
+
+    @field_validator("phases")
+    @classmethod
+    def _in_order(
+        cls, value: tuple[tuple[str, float, float], ...]
+    ) -> tuple[tuple[str, float, float], ...]:
+        each = [Phase(*row) for row in value]
+        if any(b.start_s < a.end_s for a, b in pairwise(each)):
+            raise ValueError("phases must follow one another without overlap")
+        return value
 
     @model_validator(mode="after")
     def _rising(self) -> Vibration:

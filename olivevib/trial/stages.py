@@ -59,7 +59,7 @@ STAGES = (
     Stage("calibrate", "calibration.h5", 1, ()),
     Stage("track", "tracks.h5", 1, ()),
     Stage("reconstruct", "trajectory.h5", 1, ("calibrate", "track")),
-    Stage("analyse", "vibration.h5", 1, ("reconstruct",)),
+    Stage("analyse", "vibration.h5", 2, ("reconstruct",)),
     Stage("compare", "comparison.h5", 1, ("reconstruct",)),
 )
 BY_NAME = {stage.name: stage for stage in STAGES}

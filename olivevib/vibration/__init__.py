@@ -1,15 +1,25 @@
 """Displacement, velocity, acceleration; spectra, lines with their alias status, phases, decay."""
 
 from olivevib.vibration.analysis import VibrationSettings, analyse
+from olivevib.vibration.body import Attitude, Turning, point_motion, relative_motion
 from olivevib.vibration.figures import Figures
 from olivevib.vibration.fixed import without_camera_motion
 from olivevib.vibration.kinematics import to_displacement
 from olivevib.vibration.line import LineSettings, dominant_line
 from olivevib.vibration.modal import Decay, fit_decay
-from olivevib.vibration.motion import CandidateMotion, MarkerMotion, Vibration
+from olivevib.vibration.motion import CandidateMotion, MarkerMotion
 from olivevib.vibration.orbit import Orbit, Precession, orbit, precession
 from olivevib.vibration.phases import Phase, PhaseSettings, find_phases, find_sensor_phases
+from olivevib.vibration.response import MarkerResponse, marker_response
+from olivevib.vibration.result import Vibration
 from olivevib.vibration.ridge import Ridge, camera_ridge, sensor_ridge
+from olivevib.vibration.survey import (
+    MarkerSurvey,
+    NamedMotion,
+    Survey,
+    Transmission,
+    survey,
+)
 from olivevib.vibration.transfer import (
     Deflection,
     LineRatio,
@@ -22,6 +32,7 @@ from olivevib.vibration.types import Line, LineStatus, Spectrum
 from olivevib.vibration.verdict import SamplingFacts
 
 __all__ = [
+    "Attitude",
     "CandidateMotion",
     "Decay",
     "Deflection",
@@ -31,6 +42,9 @@ __all__ = [
     "LineSettings",
     "LineStatus",
     "MarkerMotion",
+    "MarkerResponse",
+    "MarkerSurvey",
+    "NamedMotion",
     "Orbit",
     "Phase",
     "PhaseSettings",
@@ -39,6 +53,9 @@ __all__ = [
     "Ridge",
     "SamplingFacts",
     "Spectrum",
+    "Survey",
+    "Transmission",
+    "Turning",
     "Vibration",
     "VibrationSettings",
     "analyse",
@@ -50,9 +67,13 @@ __all__ = [
     "fit_decay",
     "frequency_response",
     "line_ratio",
+    "marker_response",
     "orbit",
+    "point_motion",
     "precession",
+    "relative_motion",
     "sensor_ridge",
+    "survey",
     "to_displacement",
     "without_camera_motion",
 ]

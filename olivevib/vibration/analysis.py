@@ -22,8 +22,9 @@ from olivevib.vibration.kinematics import (
     line_motion,
 )
 from olivevib.vibration.line import LineFit, LineSettings, fit_line
-from olivevib.vibration.motion import CandidateMotion, MarkerMotion, Vibration
+from olivevib.vibration.motion import CandidateMotion, MarkerMotion
 from olivevib.vibration.phases import WHOLE, Phase, PhaseSettings, find_phases
+from olivevib.vibration.result import Vibration
 from olivevib.vibration.spectrum import Grid, grid_of, spectra
 from olivevib.vibration.types import Line, LineStatus, Spectrum
 from olivevib.vibration.verdict import SamplingFacts

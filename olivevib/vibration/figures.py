@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
@@ -18,9 +19,10 @@ class Figures:
     Per axis (3,), mean removed: rms, peak (largest absolute value), peak_to_peak, crest
     (peak/rms), kurtosis (sine 1.5), noise (standard deviation of measurement noise in the
     waveform), line_amplitude (peak) with sigma, thd_percent. Of the resultant r = |x|: mean, rms
-    (= total RMS), median, p95, p99, largest; extent: peak-to-peak along the direction of largest
-    motion. Accelerations also: class_percent (5,) of time below 50, 100, 200, 300 m/s2 and above;
-    energy_m2_s3 integral of r^2; dose_m_s175 fourth root of the integral of r^4.
+    (= total RMS), median, p95, p99, largest;
+    extent: peak-to-peak along the direction of largest motion, with the sigma of the noise of two
+    samples. Accelerations also: class_percent (5,) of time below 50, 100, 200, 300
+    m/s2 and above; energy_m2_s3 integral of r^2; dose_m_s175 fourth root of the integral of r^4.
     """
 
     quantity: str
@@ -44,6 +46,7 @@ class Figures:
     class_percent: Floats
     energy_m2_s3: float
     dose_m_s175: float
+    extent_sigma: float = nan
 
     def __post_init__(self) -> None:
         for name in _AXES:
@@ -95,6 +98,7 @@ def figures(
     peak = np.abs(x).max(axis=0)
     r = np.sqrt(np.sum(x**2, axis=1))
     p95, p99 = np.percentile(r, [95, 99])
+    direction, extent = _extent(x)
     accelerations = quantity == "acceleration"
     return Figures(
         quantity=quantity,
@@ -114,7 +118,8 @@ def figures(
         resultant_p95=float(p95),
         resultant_p99=float(p99),
         resultant_max=float(r.max()),
-        extent=_extent(x),
+        extent=extent,
+        extent_sigma=float(np.sqrt(2 * np.sum((direction * noise) ** 2))),
         class_percent=_shares(r) if accelerations else np.full(5, np.nan),
         energy_m2_s3=float(np.mean(r**2) * duration_s) if accelerations else np.nan,
         dose_m_s175=float((np.mean(r**4) * duration_s) ** 0.25) if accelerations else np.nan,
@@ -154,9 +159,10 @@ def _ratio(above: Floats, below: Floats) -> Floats:
     return np.asarray(np.divide(above, below, out=out, where=below > 0))
 
 
-def _extent(x: Floats) -> float:
+def _extent(x: Floats) -> tuple[Floats, float]:
+    """Direction of largest motion (3,) and peak-to-peak along it."""
     direction = np.linalg.eigh(x.T @ x)[1][:, -1]
-    return float(np.ptp(x @ direction))
+    return direction, float(np.ptp(x @ direction))
 
 
 def _shares(r: Floats) -> Floats:

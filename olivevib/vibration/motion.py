@@ -1,15 +1,12 @@
-"""What is known of each marker's motion in each phase, and of a whole trial."""
+"""What is known of each marker's motion in each phase."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from olivevib.arrays import Floats, floats
-from olivevib.errors import Caution
 from olivevib.vibration.figures import Figures
-from olivevib.vibration.phases import Phase
-from olivevib.vibration.types import Line, Spectrum
+from olivevib.vibration.types import Line
 
 
 @dataclass(frozen=True)
@@ -56,22 +53,7 @@ class MarkerMotion:
         """Peak-to-peak displacement along the direction of largest motion."""
         return self.displacement.extent
 
-
-@dataclass(frozen=True)
-class Vibration:
-    """The analysis of a trial: phases, spectra by quantity, one row a marker and phase.
-
-    The spectra and headline lines are those of ``spectrum_phase`` ("steady", or "whole").
-    """
-
-    phases: tuple[Phase, ...]
-    spectra: Mapping[str, Spectrum]
-    table: tuple[MarkerMotion, ...]
-    spectrum_phase: str
-    cautions: tuple[Caution, ...] = ()
-
-    def row(self, marker_id: int, phase: str | None = None) -> MarkerMotion | None:
-        """The row of a marker in a phase (the spectrum's where none is named), or None."""
-        wanted = self.spectrum_phase if phase is None else phase
-        rows = [r for r in self.table if r.id == marker_id and r.phase == wanted]
-        return rows[0] if rows else None
+    @property
+    def displacement_pp_sigma_mm(self) -> float:
+        """Its standard deviation from the noise of two single samples (an upper bound)."""
+        return self.displacement.extent_sigma

@@ -11,6 +11,8 @@ import numpy as np
 
 from olivevib.arrays import Floats, Ints, floats, ints
 
+CRYSTAL = 50e-6  # relative standard deviation of a camera's own clock, which no picture shows
+
 
 class LineStatus(StrEnum):
     """How far the frequency of a line is known; never print a frequency without it.
@@ -54,6 +56,11 @@ class Line:
     harmonics: Floats
     probabilities: tuple[float, ...] = ()
     reasons: tuple[str, ...] = ()
+
+    @property
+    def f_clock_sigma_hz(self) -> float:
+        """What the camera's crystal may add to f_sigma_hz: common to all markers and trials."""
+        return CRYSTAL * self.f_hz
 
     def __post_init__(self) -> None:
         for name in ("amplitude", "amplitude_sigma", "phase_rad"):

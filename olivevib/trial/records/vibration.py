@@ -17,6 +17,7 @@ from olivevib.trial.records.columns import (
     padded,
     texts,
 )
+from olivevib.trial.records.survey import survey_columns, survey_from
 from olivevib.trial.stages import BY_NAME, Fingerprint
 from olivevib.vibration import CandidateMotion, MarkerMotion, Phase, Spectrum, Vibration
 
@@ -52,10 +53,10 @@ def vibration_file(result: Vibration, now: Fingerprint) -> StageFile:
                 spectrum.end_s,
             ]
         )
-    variables |= _grouped("table", _table(result.table))
-    for quantity in QUANTITIES:
-        figures = [getattr(row, quantity) for row in result.table]
-        variables |= _grouped(f"table_{quantity}", figure_columns(figures, "row"))
+    variables |= _rows(result.table, "table")
+    if result.survey is not None:
+        more, facts = survey_columns(result.survey, _rows)
+        variables, attributes = variables | more, attributes | facts
     return StageFile(
         stage=STAGE.name,
         schema=STAGE.schema,
@@ -64,6 +65,16 @@ def vibration_file(result: Vibration, now: Fingerprint) -> StageFile:
         variables=variables,
         attributes=attributes,
     )
+
+
+def _rows(rows: tuple[MarkerMotion, ...], group: str) -> Columns:
+    """Rows of one marker and phase each: their lines in ``group``, their figures in three more."""
+    out = _grouped(group, _table(rows, "row" if group == "table" else f"{group}_row"))
+    for quantity in QUANTITIES:
+        figures = [getattr(row, quantity) for row in rows]
+        columns = figure_columns(figures, "row" if group == "table" else f"{group}_row")
+        out |= _grouped(f"{group}_{quantity}", columns)
+    return out
 
 
 def _grouped(group: str, columns: Columns) -> Columns:
@@ -86,23 +97,23 @@ def _spectrum(spectrum: Spectrum) -> Columns:
     } | line_columns(spectrum.lines, "marker")
 
 
-def _table(rows: tuple[MarkerMotion, ...]) -> Columns:
+def _table(rows: tuple[MarkerMotion, ...], dim: str) -> Columns:
     words = tuple(dict.fromkeys(row.phase for row in rows))
     phase = np.array([words.index(row.phase) for row in rows], np.int64)
     out = {
-        "row": Variable(("row",), np.arange(len(rows)), "1", "row"),
-        "id": Variable(("row",), np.array([r.id for r in rows], np.int64), "1", "marker id"),
-        "phase": Variable(("row",), phase, "1", "phase of the trial", words),
-        "start": Variable(("row",), np.array([r.start_s for r in rows]), "s", "start of the phase"),
-        "end": Variable(("row",), np.array([r.end_s for r in rows]), "s", "end of the phase"),
-        "samples": Variable(("row",), np.array([r.samples for r in rows], np.int64), "1", "used"),
+        dim: Variable((dim,), np.arange(len(rows)), "1", "row"),
+        "id": Variable((dim,), np.array([r.id for r in rows], np.int64), "1", "marker id"),
+        "phase": Variable((dim,), phase, "1", "phase of the trial", words),
+        "start": Variable((dim,), np.array([r.start_s for r in rows]), "s", "start of the phase"),
+        "end": Variable((dim,), np.array([r.end_s for r in rows]), "s", "end of the phase"),
+        "samples": Variable((dim,), np.array([r.samples for r in rows], np.int64), "1", "used"),
     }
     for name, unit in CANDIDATE.items():
         values = padded([[getattr(c, name) for c in row.candidates] for row in rows], 3)
-        out[f"candidate_{name}"] = Variable(("row", "candidate", "axis"), values, unit, name)
+        out[f"candidate_{name}"] = Variable((dim, "candidate", "axis"), values, unit, name)
     rms = padded([[c.acceleration_rms_m_s2 for c in row.candidates] for row in rows])
-    out["candidate_acceleration_rms"] = Variable(("row", "candidate"), rms, "m/s2", "total RMS")
-    return out | line_columns([row.line for row in rows], "row")
+    out["candidate_acceleration_rms"] = Variable((dim, "candidate"), rms, "m/s2", "total RMS")
+    return out | line_columns([row.line for row in rows], dim)
 
 
 def vibration_from(file: StageFile) -> Vibration:
@@ -111,9 +122,10 @@ def vibration_from(file: StageFile) -> Vibration:
     return Vibration(
         phases=tuple(Phase(name, start, end) for name, start, end in phases),
         spectra={q: _spectrum_from(file, q) for q in QUANTITIES},
-        table=_table_from(file),
+        table=_table_from(file, "table", str(file.attributes["table_reasons"])),
         spectrum_phase=str(file.attributes["spectrum_phase"]),
         cautions=cautions_from(file.attributes["cautions"]),
+        survey=survey_from(file, _motions_from),
     )
 
 
@@ -140,12 +152,17 @@ def _spectrum_from(file: StageFile, quantity: str) -> Spectrum:
     )
 
 
-def _table_from(file: StageFile) -> tuple[MarkerMotion, ...]:
-    columns = _group(file, "table")
+def _motions_from(file: StageFile, group: str) -> tuple[MarkerMotion, ...]:
+    reasons = json.loads(str(file.attributes["survey"]))["motion_reasons"]
+    return _table_from(file, group, json.dumps(reasons)) if reasons else ()
+
+
+def _table_from(file: StageFile, group: str, reasons: str) -> tuple[MarkerMotion, ...]:
+    columns = _group(file, group)
     words = columns["phase"].flag_words
-    lines = lines_from(columns, "mm", json.loads(str(file.attributes["table_reasons"])))
+    lines = lines_from(columns, "mm", json.loads(reasons))
     figures = {
-        q: figures_from(_group(file, f"table_{q}"), q, unit) for q, unit in QUANTITIES.items()
+        q: figures_from(_group(file, f"{group}_{q}"), q, unit) for q, unit in QUANTITIES.items()
     }
     get = {name: np.asarray(v.values) for name, v in columns.items()}
     return tuple(
