@@ -15,10 +15,10 @@ from olivevib.trial.stages import (
 PRINTS = {s.name: Fingerprint({"in": s.name}, {"a": 1, "b": [1, 2]}) for s in STAGES}
 
 
-def write(folder, name, print_=None, schema=1):
+def write(folder, name, print_=None, schema=None):
     stage = next(s for s in STAGES if s.name == name)
     print_ = print_ or PRINTS[name]
-    file = StageFile(stage.name, schema, dict(print_.settings), dict(print_.inputs), {}, {})
+    file = StageFile(stage.name, schema or stage.schema, dict(print_.settings), dict(print_.inputs), {}, {})
     write_stage(folder / stage.file, file)
 
 
