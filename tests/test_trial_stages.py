@@ -18,7 +18,8 @@ PRINTS = {s.name: Fingerprint({"in": s.name}, {"a": 1, "b": [1, 2]}) for s in ST
 def write(folder, name, print_=None, schema=None):
     stage = next(s for s in STAGES if s.name == name)
     print_ = print_ or PRINTS[name]
-    file = StageFile(stage.name, schema or stage.schema, dict(print_.settings), dict(print_.inputs), {}, {})
+    schema = stage.schema if schema is None else schema
+    file = StageFile(stage.name, schema, dict(print_.settings), dict(print_.inputs), {}, {})
     write_stage(folder / stage.file, file)
 
 

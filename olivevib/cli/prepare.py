@@ -45,10 +45,30 @@ def new(arguments: argparse.Namespace, console: Console) -> int:
         right_stamps=arguments.right_stamps,
         accelerometer=arguments.accelerometer,
         accelerometer_marker=arguments.accelerometer_marker,
+        preset=_preset(arguments.preset),
         link=arguments.link,
     )
     folder = place_for_new(arguments.trial, Path())
     trial = pipeline.new_trial(folder, plan, console.tick)
     console.say(f"made {trial.folder}; describe it in {trial.folder / 'trial.toml'}")
     console.say(f"Next: olivevib run {arguments.trial}")
+    return 0
+
+
+def _preset(name: str | None) -> str | None:
+    """The file of a preset: a name under presets/ of the workspace, or a path."""
+    kept = Path("presets") / f"{name}.toml"
+    return str(kept) if name and kept.is_file() else name
+
+
+def preset(arguments: argparse.Namespace, console: Console) -> int:
+    """Keep how a trial's accelerometer file is read, for other trials."""
+    from olivevib import pipeline
+    from olivevib.trial import Trial
+    from olivevib.trial.workspace import find_trial
+
+    trial = Trial.open(find_trial(arguments.trial, Path()))
+    path = pipeline.keep_preset(trial, arguments.name, arguments.sensor, Path())
+    print(path)
+    console.say(f"Next: olivevib new TRIAL … --accelerometer FILE --preset {arguments.name}")
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 CANDIDATES_SHOWN = 5
@@ -93,6 +94,15 @@ def _markers(rows: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
+def with_sigma(value: float, sigma: float | None, digits: int) -> str:
+    """Value ± sigma with two significant digits of sigma, at most seven decimals."""
+    if sigma is None or sigma <= 0:
+        return f"{value:.{digits}f}"
+    places = min(7, max(0, 1 - math.floor(math.log10(sigma))))
+    small = f"< {10.0**-places:.0e}" if sigma < 10.0**-places else f"{sigma:.{places}f}"
+    return f"{value:.{places}f} ± {small}"
+
+
 def _has(value: float | None) -> bool:
     return value is not None
 
@@ -104,8 +114,7 @@ def frequency(m: dict[str, Any]) -> str:
         return "not analysed"
     if m["frequency_hz"] is not None:
         sigma = m["frequency_sigma_hz"]
-        spread = f" ± {sigma:.4f}" if sigma is not None else ""
-        return f"{m['frequency_hz']:.4f}{spread} Hz, {status}"
+        return f"{with_sigma(m['frequency_hz'], sigma, 4)} Hz, {status}"
     candidates = m["frequency_candidates_hz"]
     if not candidates:
         return str(status)
@@ -119,9 +128,9 @@ def _comparison(c: dict[str, Any]) -> list[str]:
         return []
     lines = [f"accelerometer: {c['verdict']}", f"  {c['reason']}"]
     if c["clock_offset_s"] is not None:
+        sigma_ms = _ms(c["clock_offset_sigma_s"])
         lines.append(
-            f"  clock offset {c['clock_offset_s'] * 1e3:+.3f} ± "
-            f"{number(_ms(c['clock_offset_sigma_s']), 3)} ms, "
+            f"  clock offset {with_sigma(1e3 * c['clock_offset_s'], sigma_ms, 3)} ms, "
             f"drift {number(c['clock_drift_ppm'], 1, 'ppm')}, gain {number(c['gain'], 4)}, "
             f"rotation {number(c['rotation_deg'], 1, '°')}, coherence {number(c['coherence'], 3)}"
         )

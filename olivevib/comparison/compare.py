@@ -237,6 +237,13 @@ class _Rival:
     excluded: bool
     distance_s: float
     scatter_s: float
+    offset_s: float = np.nan
+    turn_deg: float = np.nan
+
+    @property
+    def open(self) -> bool:
+        """Both lags remain."""
+        return self.near and not self.excluded
 
 
 def _rival(work: _Work, lag: CoarseLag, clock: ClockFit) -> _Rival:
@@ -251,7 +258,15 @@ def _rival(work: _Work, lag: CoarseLag, clock: ClockFit) -> _Rival:
         frames = min(len(clock.residual_mm), len(other.residual_mm))
         excluded = bool(3 * frames * (then - now) > _DECISIVE)
         distance = abs(other.offset_s - clock.offset_s)
-    return _Rival(True, excluded, distance, np.nan if lag.level else max(distance, lag.scatter_s))
+    turn = _angle_deg(other.R_camera_sensor @ clock.R_camera_sensor.T)
+    scatter = np.nan if lag.level else max(distance, lag.scatter_s)
+    return _Rival(True, excluded, distance, scatter, lag.rival_s, turn)
+
+
+def _angle_deg(R: Floats) -> float:
+    if not np.isfinite(R).all():
+        return np.nan
+    return float(np.degrees(np.linalg.norm(vector_from_rotation(R))))
 
 
 def _comparison(
@@ -267,7 +282,7 @@ def _comparison(
     offset_sigma = float(np.hypot(sigma[0], 0.0 if rival.excluded else rival.scatter_s))
     straight = _is_straight(seen.mm, clock)
     worst_deg = float(np.degrees(_OPEN_RAD if straight else clock.turn_sigma_rad))
-    angle = float(np.degrees(np.linalg.norm(vector_from_rotation(clock.R_camera_sensor))))
+    angle = _angle_deg(clock.R_camera_sensor)
     coherence = _coherence(seen.mm, clock.residual_mm)
     verdict, reason = _verdict(work, lag, clock, coherence)
     reasons = [reason, *_remarks(work, rival, clock, worst_deg)]
@@ -292,6 +307,9 @@ def _comparison(
         sensor_mm=clock.predicted_mm,
         verdict=verdict,
         reason=" ".join(reasons),
+        ambiguous=rival.open,
+        rival_offset_s=rival.offset_s if rival.open else np.nan,
+        rival_turn_deg=rival.turn_deg if rival.open else np.nan,
     )
 
 
@@ -346,11 +364,11 @@ def _verdict(work: _Work, lag: CoarseLag, clock: ClockFit, coherence: float) -> 
 
 def _remarks(work: _Work, rival: _Rival, clock: ClockFit, worst_deg: float) -> list[str]:
     out = []
-    if rival.near and not rival.excluded:
+    if rival.open:
         out.append(
-            f"The lag is ambiguous: {1e3 * rival.distance_s:.1f} ms away the two fit as well "
-            "(a steady motion repeats itself, and half a period is half a turn). Let both record "
-            "the start of the machine."
+            f"The lag is ambiguous: {1e3 * rival.distance_s:.1f} ms away the two fit as well with "
+            f"the sensor turned by {rival.turn_deg:.0f}° against this (a steady motion repeats "
+            "itself, and half a period is half a turn). Let both record the start of the machine."
         )
     elif rival.near:
         out.append(

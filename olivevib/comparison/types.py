@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from math import nan
+
+import numpy as np
 
 from olivevib.arrays import Floats, floats
 
@@ -38,6 +41,8 @@ class Comparison:
     R_camera_sensor (3, 3) turns sensor axes into the trajectory's frame. coherence: share of the
     motion that both see, 0…1. second_peak: correlation at the best rival lag, beside ``peak``.
     overlay: t_s (N,), optical and sensor (N, 3) displacement in mm, on the trial clock.
+    ambiguous: another lag, rival_offset_s, fits as well, with the sensor turned by
+    rival_turn_deg against this one (180: half a period is half a turn).
     """
 
     marker: int
@@ -60,6 +65,35 @@ class Comparison:
     sensor_mm: Floats
     verdict: Verdict
     reason: str
+    ambiguous: bool = False
+    rival_offset_s: float = nan
+    rival_turn_deg: float = nan
+
+    @property
+    def bias_mm(self) -> Floats:
+        """(3,) mean of camera less sensor; NaN without an overlay."""
+        return self._difference()[0]
+
+    @property
+    def limits_mm(self) -> Floats:
+        """(3,) half width of the 95 % limits of agreement, 1.96 SD of camera less sensor.
+
+        Single positions, axis by axis: Bland, Altman, Lancet 327 (1986) 307,
+        doi 10.1016/S0140-6736(86)90837-8. Slow motion is out of both.
+        """
+        return np.asarray(1.96 * self._difference()[1])
+
+    @property
+    def limits_sigma_mm(self) -> Floats:
+        """(3,) standard deviation of each limit, sqrt(3/N) SD (the same source)."""
+        count = max(1, self.overlay_t_s.size)
+        return np.asarray(np.sqrt(3.0 / count) * self._difference()[1])
+
+    def _difference(self) -> tuple[Floats, Floats]:
+        away = self.optical_mm - self.sensor_mm
+        if len(away) < 2:
+            return np.full(3, np.nan), np.full(3, np.nan)
+        return np.asarray(away.mean(axis=0)), np.asarray(away.std(axis=0, ddof=1))
 
     def __post_init__(self) -> None:
         t_s = floats("overlay_t_s", self.overlay_t_s, (None,))

@@ -2,7 +2,7 @@
 
 from olivevib.pipeline.calibrate import calibrate
 from olivevib.pipeline.check import Finding, check
-from olivevib.pipeline.compare import compare
+from olivevib.pipeline.compare import compare, keep_preset
 from olivevib.pipeline.measure import analyse, reconstruct
 from olivevib.pipeline.new import NewTrial, new_trial
 from olivevib.pipeline.outputs import export, export_place, report
@@ -19,6 +19,7 @@ __all__ = [
     "compare",
     "export",
     "export_place",
+    "keep_preset",
     "new_trial",
     "reconstruct",
     "report",

@@ -82,11 +82,11 @@ def _checksums(path: Path, name: str, tick: Tick) -> Iterator[Finding]:
 
 def _sensors(trial: Trial) -> Iterator[Finding]:
     from olivevib.files.accelerometer import read_accelerometer
-    from olivevib.pipeline.compare import import_options
+    from olivevib.pipeline.compare import sensor_options
 
     for sensor in trial.settings.accelerometers:
         try:
-            record = read_accelerometer(trial.path(sensor.file), import_options(sensor))
+            record = read_accelerometer(trial.path(sensor.file), sensor_options(trial, sensor))
         except OlivevibError as error:
             yield Finding("lost", sensor.file, f"{error}")
         else:

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from pathlib import Path
+
 import numpy as np
 
 from olivevib.comparison import Comparison, ComparisonSettings
 from olivevib.comparison import compare as compare_records
 from olivevib.errors import Caution, InputError, UsageError
-from olivevib.files.accelerometer import AccelerometerRecord, ImportOptions, read_accelerometer
+from olivevib.files.accelerometer import (
+    AccelerometerRecord,
+    ImportOptions,
+    read_accelerometer,
+    read_preset,
+    write_preset,
+)
 from olivevib.files.store import write_stage
+from olivevib.pipeline.motions import body_point, marker_motion
 from olivevib.progress import Tick, silent
 from olivevib.reconstruction import Trajectory
 from olivevib.signals import Samples
@@ -24,50 +35,68 @@ def compare(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     if trajectory is None:
         raise trial.need("reconstruct")
     results: list[Comparison] = []
-    cautions: list[Caution] = []
+    motion, found = marker_motion(trial, trajectory)
+    cautions = list(found)
     bound = [a for a in trial.settings.accelerometers if a.marker is not None]
     for sensor in bound:
-        record = read_accelerometer(trial.path(sensor.file), import_options(sensor))
+        record = read_accelerometer(trial.path(sensor.file), sensor_options(trial, sensor))
         cautions.extend(record.cautions)
-        results.append(_one(trial, trajectory, sensor, record, tick))
+        point = _at_sensor(trajectory, motion, sensor)
+        results.append(_one(trial, point, sensor, record, tick))
     write_stage(trial.folder / "comparison.h5", comparison_file(results, cautions, now))
     return tuple(cautions)
 
 
-def import_options(sensor: Accelerometer) -> ImportOptions:
-    """What trial.toml says of how to read a sensor's file."""
-    return ImportOptions(
-        unit=sensor.unit,
-        per_g=sensor.per_g,
-        rate_hz=sensor.rate_hz,
-        time_column=sensor.time_column,
-        time_unit=sensor.time_unit,
-        columns=sensor.columns,
-        axes=sensor.axes,
-        start=sensor.start,
-    )
+def sensor_options(trial: Trial, sensor: Accelerometer) -> ImportOptions:
+    """How to read a sensor's file: what trial.toml says, over its preset, over what is read."""
+    preset = read_preset(trial.path(sensor.preset)) if sensor.preset else ImportOptions()
+    told = sensor.model_dump(include={f.name for f in fields(ImportOptions)})
+    return replace(preset, **{name: value for name, value in told.items() if value})
 
 
-def _one(
-    trial: Trial,
-    trajectory: Trajectory,
-    sensor: Accelerometer,
-    record: AccelerometerRecord,
-    tick: Tick,
-) -> Comparison:
+def keep_preset(trial: Trial, name: str, sensor: int, workspace: Path) -> Path:
+    """Write how the trial's sensor (from 1) is read as presets/NAME.toml; returns the file."""
+    told = trial.settings.accelerometers
+    if not 1 <= sensor <= len(told):
+        raise UsageError(
+            f"{trial.name} has no accelerometer number {sensor}.",
+            f"Its trial.toml names {len(told)}.",
+            "Give --sensor within these.",
+        )
+    if not name.replace("-", "").replace("_", "").isalnum():
+        raise UsageError(f"{name!r} is no name of a preset.", "", "Use letters, digits, - and _.")
+    path = workspace / "presets" / f"{name}.toml"
+    path.parent.mkdir(exist_ok=True)
+    write_preset(path, sensor_options(trial, told[sensor - 1]))
+    return path
+
+
+def _at_sensor(
+    trajectory: Trajectory, motion: Mapping[int, Samples], sensor: Accelerometer
+) -> Samples:
+    """How the point moved where the sensor sat: the marker's centre, and its lever as it turns."""
     marker = sensor.marker
-    if marker is None or marker not in trajectory.ids:
+    if marker is None or marker not in motion:
         seen = ", ".join(str(int(i)) for i in trajectory.ids) or "none"
         raise UsageError(
             f"the accelerometer {sensor.file} is bound to marker {marker}, which was not tracked.",
             f"Tracked markers: {seen}.",
             "Correct accelerometers.marker in trial.toml.",
         )
+    return body_point(trajectory, motion[marker], marker, sensor.lever_mm)
+
+
+def _one(
+    trial: Trial,
+    point: Samples,
+    sensor: Accelerometer,
+    record: AccelerometerRecord,
+    tick: Tick,
+) -> Comparison:
     exposure = trial.settings.cameras.left.exposure_ms
     settings = ComparisonSettings(exposure_s=(exposure or 0.0) * 1e-3)
-    return compare_records(
-        trajectory.samples(marker), _three_axes(record), marker, sensor.file, settings, tick
-    )
+    marker = -1 if sensor.marker is None else sensor.marker
+    return compare_records(point, _three_axes(record), marker, sensor.file, settings, tick)
 
 
 def _three_axes(record: AccelerometerRecord) -> Samples:

@@ -11,7 +11,8 @@ import tomlkit
 from tomlkit.items import Table
 
 from olivevib.calibration.boards import parse_board
-from olivevib.errors import InputError, UsageError
+from olivevib.errors import InputError, OlivevibError, UsageError
+from olivevib.files.accelerometer import NoAccelerationError, read_accelerometer, read_preset
 from olivevib.files.atomic import as_input_error
 from olivevib.files.capture import sidecar_of
 from olivevib.files.stamps import pick_camera
@@ -48,6 +49,7 @@ class NewTrial:
     right_stamps: str | None = None
     accelerometer: str | None = None
     accelerometer_marker: int | None = None
+    preset: str | None = None
     link: bool = False
     simulated: bool = False
     exposure_ms: float | None = None
@@ -132,11 +134,24 @@ def _check(plan: NewTrial) -> None:
         stamps = getattr(plan, f"{side}_stamps")
         if stamps:
             pick_camera(stamps, Path(getattr(plan, side)).name)
+    if plan.accelerometer:
+        _check_accelerometer(Path(plan.accelerometer), plan.preset)
+
+
+def _check_accelerometer(path: Path, preset: str | None) -> None:
+    """InputError where the file holds no acceleration; what options may mend waits for compare."""
+    options = read_preset(Path(preset)) if preset else None
+    try:
+        read_accelerometer(path, options)
+    except NoAccelerationError:
+        raise
+    except OlivevibError:
+        return
 
 
 def _named(plan: NewTrial) -> Iterator[Path]:
     names = [plan.left, plan.right, plan.calibration_left, plan.calibration_right]
-    names += [plan.rig, plan.accelerometer]
+    names += [plan.rig, plan.accelerometer, plan.preset]
     yield from (Path(name) for name in names if name)
 
 
@@ -207,6 +222,8 @@ def _wanted(plan: NewTrial) -> dict[str, str]:
             wanted.setdefault(source, Path(source).name)
     if plan.accelerometer:
         wanted.setdefault(plan.accelerometer, "accelerometer" + Path(plan.accelerometer).suffix)
+    if plan.preset:
+        wanted.setdefault(plan.preset, "accelerometer.preset.toml")
     if plan.rig:
         wanted.setdefault(plan.rig, "shared_rig.toml")
     if plan.markers.endswith(".toml"):
@@ -244,7 +261,11 @@ def _document(plan: NewTrial, places: _Places) -> tomlkit.TOMLDocument:
     if calibration:
         doc["calibration"] = calibration
     if plan.accelerometer:
-        sensor = {"file": places.get(plan.accelerometer), "marker": plan.accelerometer_marker}
+        sensor = {
+            "file": places.get(plan.accelerometer),
+            "marker": plan.accelerometer_marker,
+            "preset": places.get(plan.preset),
+        }
         doc["accelerometers"] = tomlkit.aot()
         doc["accelerometers"].append(_table(sensor))
     if plan.band_hz:

@@ -58,9 +58,9 @@ class Stage:
 STAGES = (
     Stage("calibrate", "calibration.h5", 1, ()),
     Stage("track", "tracks.h5", 1, ()),
-    Stage("reconstruct", "trajectory.h5", 1, ("calibrate", "track")),
+    Stage("reconstruct", "trajectory.h5", 2, ("calibrate", "track")),
     Stage("analyse", "vibration.h5", 2, ("reconstruct",)),
-    Stage("compare", "comparison.h5", 1, ("reconstruct",)),
+    Stage("compare", "comparison.h5", 2, ("reconstruct",)),
 )
 BY_NAME = {stage.name: stage for stage in STAGES}
 UNUSABLE = (Condition.MISSING, Condition.FAILED, Condition.BLOCKED, Condition.SKIPPED)

@@ -5,13 +5,13 @@ What is not known is None. Amplitudes are peak, of the dominant line in the stea
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from olivevib.comparison import Comparison
 from olivevib.errors import Caution
+from olivevib.trial.survey_summary import known, sensor_summary, vibration_summary
 from olivevib.vibration import LineStatus, MarkerMotion
 
 if TYPE_CHECKING:
@@ -31,14 +31,11 @@ def summary(trial: Trial) -> dict[str, Any]:
         "calibration": _calibration(trial),
         "timing": _timing(trial),
         "markers": _markers(trial),
+        "vibration": vibration_summary(trial.vibration),
         "comparison": _comparison(trial.comparison),
+        "comparisons": [sensor_summary(c) for c in trial.comparison],
         "warnings": [_caution(c) for c in trial.cautions],
     }
-
-
-def known(value: float | None) -> float | None:
-    """The value, or None where it is not a number."""
-    return None if value is None or not math.isfinite(value) else float(value)
 
 
 def _caution(caution: Caution) -> dict[str, str]:
@@ -112,19 +109,23 @@ def _motion(row: MarkerMotion | None) -> dict[str, Any]:
             "amplitude_mm": unknown,
             "amplitude_sigma_mm": unknown,
             "acceleration_rms_m_s2": None,
+            "frequency_clock_sigma_hz": None,
             "displacement_pp_mm": None,
+            "displacement_pp_sigma_mm": None,
         }
     line, decided = row.line, row.line.status in KNOWN
     return {
         "phase": row.phase,
         "frequency_hz": known(line.f_hz) if decided else None,
         "frequency_sigma_hz": known(line.f_sigma_hz),
+        "frequency_clock_sigma_hz": known(line.f_clock_sigma_hz) if decided else None,
         "frequency_status": line.status.value,
         "frequency_candidates_hz": [float(f) for f in line.candidates_hz],
         "amplitude_mm": _axes(line.amplitude),
         "amplitude_sigma_mm": _axes(line.amplitude_sigma),
         "acceleration_rms_m_s2": known(row.acceleration_rms_m_s2),
         "displacement_pp_mm": known(row.displacement_pp_mm),
+        "displacement_pp_sigma_mm": known(row.displacement_pp_sigma_mm),
     }
 
 

@@ -9,7 +9,13 @@ import numpy as np
 from olivevib.errors import InputError, UsageError
 from olivevib.files.accelerometer.metadata import header_unit
 from olivevib.files.accelerometer.names import Meaning, meaning
-from olivevib.files.accelerometer.record import AXES, Channel, ImportOptions, Table
+from olivevib.files.accelerometer.record import (
+    AXES,
+    Channel,
+    ImportOptions,
+    NoAccelerationError,
+    Table,
+)
 from olivevib.files.accelerometer.units import ACCELERATION, TIME
 
 LINEAR = "linear acceleration"
@@ -133,7 +139,7 @@ def _axes(
         nameless = [k for k in free if meanings[k].quantity == "unknown" and not meanings[k].unit]
     if 1 <= len(nameless) <= 3 and (len(nameless) == len(free) or header_unit(table)):
         return _in_order(nameless, meanings, source), True
-    raise InputError(
+    raise NoAccelerationError(
         f"{source} holds no acceleration.",
         "Its columns: " + "; ".join(f"{m.name or k} – {_reason(m)}" for k, m in _all(meanings)),
         "Choose the accelerometer's file; if a column is an acceleration after all, name the "

@@ -10,7 +10,12 @@ import numpy as np
 
 from olivevib.errors import InputError, UsageError
 from olivevib.files.accelerometer.foreign import foreign_parser
-from olivevib.files.accelerometer.record import Channel, ImportOptions, Table
+from olivevib.files.accelerometer.record import (
+    Channel,
+    ImportOptions,
+    NoAccelerationError,
+    Table,
+)
 
 
 def is_ide(head: bytes) -> bool:
@@ -65,8 +70,10 @@ def _channel(recording: Any, options: ImportOptions, source: str) -> Any:
         return named[0]
     if len(found) == 1:
         return found[0]
+    if not found:
+        raise NoAccelerationError(f"{source} holds no acceleration.", "", "Choose another file.")
     raise InputError(
-        f"{source} holds {'several accelerometers' if found else 'no acceleration'}.",
-        f"Sets of axes: {listed}." if found else "",
-        "Name the columns of the one that you mean (columns)." if found else "Choose another file.",
+        f"{source} holds several accelerometers.",
+        f"Sets of axes: {listed}.",
+        "Name the columns of the one that you mean (columns).",
     )

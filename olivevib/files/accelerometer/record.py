@@ -10,11 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Floats, floats
-from olivevib.errors import Caution, UsageError
+from olivevib.errors import Caution, InputError, UsageError
 from olivevib.signals import Samples
 
 AXES = ("x", "y", "z")
 SEPARATORS = {"tab": "\t", "comma": ",", "semicolon": ";", "pipe": "|", "blank": " "}
+
+
+class NoAccelerationError(InputError):
+    """A recording of something else (gyroscope, force, pressure, spectrum): no option mends it."""
 
 
 @dataclass(frozen=True)

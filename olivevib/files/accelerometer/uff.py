@@ -12,7 +12,7 @@ import numpy as np
 from olivevib.arrays import Floats
 from olivevib.errors import Caution, InputError
 from olivevib.files.accelerometer.names import meaning
-from olivevib.files.accelerometer.record import Channel, Table
+from olivevib.files.accelerometer.record import Channel, NoAccelerationError, Table
 from olivevib.files.accelerometer.units import ACCELERATION
 
 _FUNCTIONS = {
@@ -76,7 +76,7 @@ def read_uff(data: bytes, source: str) -> Table:
                 sets.append(found)
     if not sets:
         what = ", ".join(dict.fromkeys(refused)) or "no dataset 58"
-        raise InputError(
+        raise NoAccelerationError(
             f"{source} holds no acceleration over time.",
             f"The universal file holds: {what}.",
             "Export the time signal of the accelerometer (dataset 58, time response).",
