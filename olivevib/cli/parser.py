@@ -93,7 +93,12 @@ def _prepare_verbs(verbs: Any) -> None:
     new.add_argument("--right-stamps", metavar="FILE", help="time stamps, one a frame")
     new.add_argument("--accelerometer", metavar="FILE", help="what the logger wrote")
     new.add_argument("--accelerometer-marker", type=int, metavar="ID", help="where it was fixed")
+    new.add_argument("--preset", metavar="NAME", help="how it is read (olivevib preset)")
     new.add_argument("--link", action="store_true", help="leave the recordings where they are")
+    preset = _add(verbs, "preset", "prepare:preset", "keep how an accelerometer file is read")
+    preset.add_argument("trial", metavar="TRIAL", help="its [[accelerometers]] say how")
+    preset.add_argument("name", metavar="NAME", help="becomes presets/NAME.toml")
+    preset.add_argument("--sensor", type=int, default=1, metavar="N", help="which one (1)")
 
 
 def _capture_verb(verbs: Any) -> None:
