@@ -75,7 +75,7 @@ def test_centres_reach_the_bound_and_their_ellipses_hold(size, tilt, limit):
                 start, blur = fit.H, Blur(blur.variance_px2 + fit.further[0])
             assert fit.converged
             e = apply_homography(fit.H, [[0, 0]])[0] - apply_homography(H, [[0, 0]])[0]
-            J = point_jacobian(fit, np.zeros((1, 2)))[0]
+            J = point_jacobian(fit.H, fit.to_template, np.zeros((1, 2)), (fit.centre, fit.scale))[0]
             C = J @ fit.covariance @ J.T
             errors.append(e)
             claimed.append(np.trace(C) / 2)
@@ -92,7 +92,7 @@ def test_derivatives_of_points_against_refitting():
     grey = noisy(canvas.light, np.random.default_rng(0))
     fit = fit_template(draw_template(white, H, Blur()), marker_pixels(grey, H, 11))
     points = np.vstack([[[0, 0]], STONES])
-    J = point_jacobian(fit, points)
+    J = point_jacobian(fit.H, fit.to_template, points, (fit.centre, fit.scale))
     N = np.array([[1, 0, -fit.centre[0]], [0, 1, -fit.centre[1]], [0, 0, fit.scale]]) / fit.scale
     key = N @ fit.H
 

@@ -2,6 +2,8 @@
 
 from olivevib.detection.detection import Detection, Reader
 from olivevib.detection.detector import Detector
+from olivevib.detection.follow import Known
 from olivevib.detection.settings import DetectionSettings
+from olivevib.detection.template import Blur
 
-__all__ = ["Detection", "DetectionSettings", "Detector", "Reader"]
+__all__ = ["Blur", "Detection", "DetectionSettings", "Detector", "Known", "Reader"]

@@ -52,10 +52,10 @@ def fit_card(
     if pixels is None:
         return None
     found = approach(draw_template(white, H, blur, layout.quiet, COARSE), pixels)
-    one = None if found is None else _fine(grey, white, layout, found[0], _rounder(blur, found[1]))
+    one = None if found is None else _fine(grey, white, layout, found[0], _further(blur, found[1]))
     if one is not None and one.fit.rms <= EVEN * one.fit.gain:
         return one
-    if one is not None and one.blur.variance_px2 > MOVING_PX2:
+    if one is not None and (one.blur.variance_px2 > MOVING_PX2 or one.blur.path_px > 0):
         one = _moving(grey, white, layout, one)
         if one.fit.rms <= EVEN * one.fit.gain:
             return one
@@ -75,7 +75,7 @@ def _fine(
         fit = pixels and fit_template(draw_template(white, H, blur, layout.quiet), pixels)
         if not fit:
             return None
-        wider = _rounder(blur, fit.further)
+        wider = _further(blur, fit.further)
         one = CardFit(fit, wider)
         if abs(fit.further[0]) < REDRAWN_PX2:
             break
@@ -85,7 +85,7 @@ def _fine(
 
 def _moving(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit) -> CardFit:
     """The same marker with a motion path where its blur is longer than wide; ``one`` if not."""
-    H, blur = one.fit.H, replace(one.blur, motion_px=(0.0, 0.0))
+    H, blur = one.fit.H, one.blur
     pixels = _blurred_pixels(grey, H, blur, layout)
     template = draw_template(white, H, blur, layout.quiet, moments=True)
     fit = pixels and fit_template(template, pixels)
@@ -163,6 +163,10 @@ def _rounder(blur: Blur, further: Floats) -> Blur:
     return replace(blur, variance_px2=_believed(blur.variance_px2 + float(further[0])))
 
 
+def _further(blur: Blur, further: Floats) -> Blur:
+    return _longer(blur, further) if further.size == 2 else _rounder(blur, further)
+
+
 def _longer(blur: Blur, further: Floats) -> Blur:
     """A moving blur with further variances: round, and along its path (path² / 12)."""
     path2 = max(blur.path_px**2 + 12 * float(further[1]), 0.0)
@@ -173,16 +177,16 @@ def _longer(blur: Blur, further: Floats) -> Blur:
 
 def _motion(blur: Blur, further: Floats) -> Blur:
     """A motion along the longer axis of the blur, if it is clearly longer; xx, xy, yy added."""
-    xx, xy, yy = further
-    small, large = np.linalg.eigvalsh(
-        blur.variance_px2 * np.eye(2) + np.array([[xx, xy], [xy, yy]])
-    )
+    path = np.array(blur.motion_px)
+    drawn = blur.variance_px2 * np.eye(2) + np.outer(path, path) / 12
+    V = drawn + further[[0, 1, 1, 2]].reshape(2, 2)
+    small, large = np.linalg.eigvalsh(V)
     if large - small < ELONGATED_PX2:
         return replace(blur, motion_px=(0.0, 0.0))
-    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
+    angle = 0.5 * np.arctan2(2 * V[0, 1], V[0, 0] - V[1, 1])
     small = _believed(float(small))
-    path = float(np.sqrt(12 * (large - small))) if large > small else 0.0
-    return Blur(small, (path * float(np.cos(angle)), path * float(np.sin(angle))))
+    length = float(np.sqrt(12 * (large - small))) if large > small else 0.0
+    return Blur(small, (length * float(np.cos(angle)), length * float(np.sin(angle))))
 
 
 def _believed(variance_px2: float) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from olivevib.arrays import Grey
 from olivevib.detection.detection import Detection, Reader
+from olivevib.detection.follow import Follower
 from olivevib.detection.foreign import ForeignReader
 from olivevib.detection.paper import PaperReader
 from olivevib.detection.settings import DetectionSettings
@@ -30,6 +31,10 @@ class Detector:
         if grey.ndim != 2 or grey.dtype != "uint8":
             raise ValueError(f"need a grey image (H, W) uint8, got {grey.shape} {grey.dtype}")
         return self._reader.detect(grey)
+
+    def follower(self) -> Follower | None:
+        """What follows its markers from frame to frame; None where each frame is read by itself."""
+        return Follower(self._reader) if isinstance(self._reader, TemplateReader) else None
 
     def mirrored_ids(self, grey: Grey) -> tuple[int, ...]:
         """Ids seen as in a mirror: the recording is mirrored. Foreign families cannot tell: ()."""

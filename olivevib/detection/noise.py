@@ -21,8 +21,13 @@ DOUBT = 3.0  # standard deviations that make a correlation of the noise believab
 UNKNOWNS = 15  # of a fit in even, still light
 
 
-def noise_covariance(pixels: Pixels, E: Singles, residual: Singles, clear: Bools) -> Floats:
-    """Covariance (8, 8) of estimates Σ E(x) r(x), E (8, N), from the residuals that are clear."""
+def noise_covariance(
+    pixels: Pixels, E: Singles, residual: Singles, clear: Bools
+) -> tuple[Floats, Singles]:
+    """Covariance (8, 8) of estimates Σ E(x) r(x), E (8, N), from the residuals that are clear.
+
+    And the noise itself: its autocorrelation, variance in the middle.
+    """
     left, top = int(pixels.x.min()) - LAGS, int(pixels.y.min()) - LAGS
     shape = (int(pixels.y.max()) - top + LAGS + 1, int(pixels.x.max()) - left + LAGS + 1)
     at = (pixels.y - top) * shape[1] + (pixels.x - left)
@@ -33,12 +38,12 @@ def noise_covariance(pixels: Pixels, E: Singles, residual: Singles, clear: Bools
     kernel = autocorrelation(noise, seen)
     if np.count_nonzero(kernel) == 1:
         white: Floats = (kernel[LAGS, LAGS] * (E @ E.T)).astype(np.float64)
-        return white
+        return white, kernel
     field = np.zeros((shape[0] * shape[1], 8), dtype=np.float32)
     field[at] = E.T
     smeared = cv2.filter2D(field.reshape(*shape, 8), -1, kernel, borderType=cv2.BORDER_CONSTANT)
     C: Floats = (E @ smeared.reshape(-1, 8)[at]).astype(np.float64)
-    return (C + C.T) / 2
+    return (C + C.T) / 2, kernel
 
 
 def autocorrelation(noise: Singles, seen: Singles) -> Singles:

@@ -35,7 +35,8 @@ class Fit:
 
     H (3, 3): centred modules to px; image, weights (N,): levels that it predicts at
     the pixels, and their robust weights; to_template (3, 3): homography in normalised coordinates
-    X = (x - centre)/scale; covariance (8, 8) of its first eight entries; gain grey levels between
+    X = (x - centre)/scale; covariance (8, 8) of its first eight entries, noise
+    (5, 5) autocorrelation of the pixels' noise; gain grey levels between
     dark and white at the centre; rms of the residual, grey levels; further (S,): variances to
     add to the template's blur, px²; weight: mean robust weight; cells (3, 3): mean weight of each
     ninth of the marker; ncc, whole_ncc: correlation of image and template where the marker is
@@ -47,6 +48,7 @@ class Fit:
     weights: Singles
     to_template: Floats
     covariance: Floats
+    noise: Singles
     centre: Floats
     scale: float
     gain: float
@@ -170,13 +172,15 @@ def fit_template(template: Template, pixels: Pixels) -> Fit | None:
     rms = float(np.sqrt((whitened[clear] ** 2).sum() / (clear.sum() - unknowns)))
     H = _from_template(pixels, end.state.W) @ template.H
     counts = np.maximum(np.bincount(pixels.cell, minlength=9), 1)
-    estimate = inverse[:8].astype(np.float32) @ (WJ / np.sqrt(pixels.trust))
+    estimate = (inverse[:8].astype(np.float32) @ (WJ / np.sqrt(pixels.trust))).astype(np.float32)
+    covariance, noise = noise_covariance(pixels, estimate, whitened, clear)
     return Fit(
         H=H / H[2, 2],
         image=pixels.level - end.residual,
         weights=end.weight,
         to_template=end.state.W,
-        covariance=noise_covariance(pixels, estimate.astype(np.float32), whitened, clear),
+        covariance=covariance,
+        noise=noise,
         centre=pixels.centre,
         scale=pixels.scale,
         gain=float(end.state.light[3]),
@@ -312,11 +316,14 @@ def _from_template(pixels: Pixels, W: Floats) -> Floats:
     return out
 
 
-def point_jacobian(fit: Fit, points: Floats) -> Floats:
-    """Derivative (N, 2, 8), px, of the images of fixed module points (N, 2) by the homography."""
-    x = apply_homography(fit.H, points)
-    X, Y = ((x - fit.centre) / fit.scale).T
-    W = fit.to_template
+def point_jacobian(H: Floats, W: Floats, points: Floats, frame: tuple[Floats, float]) -> Floats:
+    """Derivative (N, 2, 8), px, of the images of fixed module points (N, 2) by W's first entries.
+
+    H (3, 3): pose; W (3, 3) from image to template; both in X = (x - centre)/scale of ``frame``.
+    """
+    centre, scale = frame
+    x = apply_homography(H, points)
+    X, Y = ((x - centre) / scale).T
     w = W[2, 0] * X + W[2, 1] * Y + W[2, 2]
     Xt = (W[0, 0] * X + W[0, 1] * Y + W[0, 2]) / w
     Yt = (W[1, 0] * X + W[1, 1] * Y + W[1, 2]) / w
@@ -329,11 +336,22 @@ def point_jacobian(fit: Fit, points: Floats) -> Floats:
     B = np.empty((len(points), 2, 2))
     B[:, 0, 0], B[:, 0, 1] = W[0, 0] - Xt * W[2, 0], W[0, 1] - Xt * W[2, 1]
     B[:, 1, 0], B[:, 1, 1] = W[1, 0] - Yt * W[2, 0], W[1, 1] - Yt * W[2, 1]
-    out: Floats = np.asarray(-fit.scale * np.linalg.solve(B, Q), dtype=np.float64)
+    out: Floats = np.asarray(-scale * np.linalg.solve(B, Q), dtype=np.float64)
     return out
 
 
+def point_images(
+    H: Floats, W: Floats, covariance: Floats, points: Floats, frame: tuple[Floats, float]
+) -> tuple[Floats, Floats]:
+    """Images (N, 2), px, of centred module points (N, 2) and their covariance (2 N, 2 N), px².
+
+    covariance (8, 8) of the first entries of W; H, W, frame as in ``point_jacobian``.
+    """
+    J = point_jacobian(H, W, points, frame).reshape(2 * len(points), 8)
+    return apply_homography(H, points), J @ covariance @ J.T
+
+
 def fitted_points(fit: Fit, points: Floats) -> tuple[Floats, Floats]:
-    """Images (N, 2), px, of centred module points (N, 2) and their covariance (2 N, 2 N), px²."""
-    J = point_jacobian(fit, points).reshape(2 * len(points), 8)
-    return apply_homography(fit.H, points), J @ fit.covariance @ J.T
+    """Images (N, 2), px, of centred module points (N, 2) of a fit, and their covariance."""
+    frame = (fit.centre, fit.scale)
+    return point_images(fit.H, fit.to_template, fit.covariance, points, frame)

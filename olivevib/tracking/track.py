@@ -1,23 +1,17 @@
-"""Frames of one camera to tracks: location rectangles, re-initialisation, states.
-
-Source: paper, section 3.3.
-"""
+"""What was seen of each marker, frame by frame, and why it was not seen where it was not."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from olivevib.arrays import Floats, Grey, Ints, floats, ints
-from olivevib.detection import Detection, DetectionSettings, Detector
-from olivevib.marker import MarkerLibrary
+from olivevib.arrays import Floats, Ints, floats, ints
+from olivevib.detection import Detection
 from olivevib.signals import StampFit, State
 
 LOST_AFTER_S = 1.0  # a marker unseen for longer is lost, not merely hidden
-QUIET_SHARE = 0.25  # of the marker's box: kept around it so that its border can be read
 
 
 @dataclass(frozen=True)
@@ -65,102 +59,6 @@ class Track:
     def seen(self) -> int:
         """In how many frames the marker was seen."""
         return int(np.isfinite(self.centre_px[:, 0]).sum())
-
-
-class Tracker:
-    """Follows the markers of one camera from frame to frame; not to be shared between threads.
-
-    Each marker is searched in its location rectangle, the box of its last corners enlarged by
-    Δscale. When fewer than Δmarker are found, the whole frame is scanned (re-initialisation).
-    What it found depends on the frames alone and on ``memory()``, which ``recall`` restores.
-    """
-
-    def __init__(self, library: MarkerLibrary, settings: DetectionSettings | None = None) -> None:
-        self.settings = settings or DetectionSettings()
-        self._detector = Detector(library, self.settings)
-        self._last: dict[int, Floats] = {}
-        self._expected = self.settings.marker
-
-    def update(self, grey: Grey, t_s: float) -> list[Detection]:
-        """All markers of the next frame, sorted by id; t_s is its time, later than the last."""
-        found = self._search(grey) if self._last else {}
-        if len(found) < max(1, self._expected):
-            found |= {d.id: d for d in self._detector.detect(grey)}
-        self._last = {i: d.corners_px for i, d in found.items()}
-        if not self.settings.marker:
-            self._expected = max(self._expected, len(found))
-        return [found[i] for i in sorted(found)]
-
-    def memory(self) -> bytes:
-        """What the tracker carries from frame to frame, to go on later as if never stopped."""
-        last = {str(i): [v.hex() for v in c.ravel().tolist()] for i, c in self._last.items()}
-        return json.dumps({"last": last, "expected": self._expected}).encode()
-
-    def recall(self, memory: bytes) -> None:
-        """Go on from a ``memory()``."""
-        stored = json.loads(memory)
-        self._expected = int(stored["expected"])
-        self._last = {
-            int(i): np.array([float.fromhex(v) for v in c]).reshape(4, 2)
-            for i, c in stored["last"].items()
-        }
-
-    def _search(self, grey: Grey) -> dict[int, Detection]:
-        height, width = grey.shape
-        boxes = _merged([_rectangle(c, self.settings.scale) for c in self._last.values()])
-        found: dict[int, Detection] = {}
-        for x0, y0, x1, y1 in boxes:
-            left, top = max(0, int(x0)), max(0, int(y0))
-            right, bottom = min(width, int(np.ceil(x1))), min(height, int(np.ceil(y1)))
-            if right - left >= 16 and bottom - top >= 16:
-                window = np.ascontiguousarray(grey[top:bottom, left:right])
-                for detection in self._detector.detect(window):
-                    found[detection.id] = _shifted(detection, left, top)
-        return found
-
-
-def _rectangle(corners: Floats, scale: float) -> tuple[float, float, float, float]:
-    """The location rectangle: bounding box of the corners about its centre, enlarged."""
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    middle, half = (low + high) / 2, (high - low).max() / 2 * (scale + QUIET_SHARE)
-    return (middle[0] - half, middle[1] - half, middle[0] + half, middle[1] + half)
-
-
-def _merged(
-    boxes: Sequence[tuple[float, float, float, float]],
-) -> list[tuple[float, float, float, float]]:
-    """Overlapping boxes joined until none overlap, so that no marker is read twice."""
-    left = sorted(boxes)
-    done: list[tuple[float, float, float, float]] = []
-    while left:
-        a = left.pop(0)
-        k = next((k for k, b in enumerate(left) if _overlap(a, b)), None)
-        if k is None:
-            done.append(a)
-        else:
-            b = left.pop(k)
-            left.insert(0, (min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])))
-    joined = any(_overlap(a, b) for n, a in enumerate(done) for b in done[n + 1 :])
-    return _merged(done) if joined else done
-
-
-def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> bool:
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
-
-
-def _shifted(d: Detection, x: int, y: int) -> Detection:
-    """The detection of a window in the coordinates of the whole image."""
-    return Detection(
-        id=d.id,
-        corners_px=d.corners_px + np.array([x, y]),
-        corners_cov_px2=d.corners_cov_px2,
-        centre_px=d.centre_px + np.array([x, y]),
-        centre_cov_px2=d.centre_cov_px2,
-        raw_row=d.raw_row + y,
-        localiser=d.localiser,
-        bit_errors=d.bit_errors,
-        flags=d.flags,
-    )
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,123 @@
+"""The key of a marker: its drawing at one pose, read again in many frames.
+
+A marker that moves little from frame to frame is drawn once. In each frame the same texture is seen
+through a homography close to the identity, at the same pixels moved by whole pixels, so that what
+does not change is made once. A key is a function of the card, pose, blur and noise alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from olivevib.arrays import Floats
+from olivevib.detection.noise import LAGS
+from olivevib.detection.refine import Singles, marker_pixels
+from olivevib.detection.search import Patch, patch_of
+from olivevib.detection.template import REACH, Blur, Template, draw_template, module_px
+from olivevib.marker import MarkerLayout
+
+GEOMETRY, LIGHT = 8, 6  # unknowns of the homography and of the light; one more for the blur
+
+
+@dataclass(frozen=True)
+class Key:
+    """One marker drawn at a key pose.
+
+    template: texture with pose and blur; x, y (N,): its pixels there; X, Y (N,): the same about
+    ``centre`` (2,) px in units of ``scale`` px; coarse (Q,): a quarter of them; cells (9, N): row k
+    averages over the k-th ninth; patch to search with; spread (15, 15): sum of J R J' for unit
+    contrast, R the correlation of the pixels' noise; None where it is white.
+    """
+
+    template: Template
+    x: NDArray[np.intp]
+    y: NDArray[np.intp]
+    X: Singles
+    Y: Singles
+    centre: Floats
+    scale: float
+    coarse: NDArray[np.intp]
+    cells: Singles
+    patch: Patch
+    spread: Floats | None
+
+    @property
+    def H(self) -> Floats:
+        """The pose (3, 3) that it is drawn at, centred modules to px."""
+        return self.template.H
+
+
+def make_key(
+    white: Singles,
+    H: Floats,
+    blur: Blur,
+    layout: MarkerLayout,
+    noise: Singles,
+    size_px: tuple[int, int],
+) -> Key | None:
+    """Draw the key of a card at pose H in images of ``size_px`` (width, height).
+
+    noise (5, 5): autocorrelation of the pixels' noise. None where too little lies in the image.
+    """
+    reach = min(REACH, layout.quiet - blur.half_width_px / module_px(H))
+    blank = np.broadcast_to(np.uint8(0), (size_px[1], size_px[0]))
+    pixels = marker_pixels(blank, H, layout.modules, reach_modules=reach)
+    if pixels is None:
+        return None
+    template = draw_template(white, H, blur, layout.quiet)
+    counts = np.maximum(np.bincount(pixels.cell, minlength=9), 1)
+    cells = (pixels.cell == np.arange(9)[:, None]) / counts[:, None]
+    white_noise = np.count_nonzero(noise) == 1
+    spread = None if white_noise else _spread(template, pixels.X, pixels.Y, pixels.x, pixels.y,
+                                              pixels.scale, noise)  # fmt: skip
+    return Key(
+        template, pixels.x, pixels.y, pixels.X, pixels.Y, pixels.centre, pixels.scale,
+        np.flatnonzero((pixels.x % 2 == 0) & (pixels.y % 2 == 0)), cells.astype(np.float32),
+        patch_of(template, layout), spread,
+    )  # fmt: skip
+
+
+def _spread(
+    template: Template,
+    X: Singles,
+    Y: Singles,
+    x: NDArray[np.intp],
+    y: NDArray[np.intp],
+    scale: float,
+    noise: Singles,
+) -> Floats:
+    """J R J' (15, 15) of the whole marker at the key pose, for unit contrast."""
+    offset = (np.stack([x, y]).T - template.origin_px) * template.samples
+    texture = template.texture[offset[:, 1].astype(int), offset[:, 0].astype(int)]
+    T, p, q = texture[:, 0], scale * texture[:, 1], scale * texture[:, 2]
+    back = -(X * p + Y * q)
+    one = np.ones_like(X)
+    J = np.stack([p * X, p * Y, p, q * X, q * Y, q, back * X, back * Y,
+                  one, X, Y, T, X * T, Y * T, texture[:, 3]])  # fmt: skip
+    left, top = int(x.min()) - LAGS, int(y.min()) - LAGS
+    width, height = int(x.max()) - left + LAGS + 1, int(y.max()) - top + LAGS + 1
+    at = (y - top) * width + (x - left)
+    field = np.zeros((height * width, len(J)), np.float32)
+    field[at] = J.T
+    smeared = cv2.filter2D(
+        field.reshape(height, width, len(J)), -1, noise, borderType=cv2.BORDER_CONSTANT
+    )
+    B: Floats = (J @ smeared.reshape(-1, len(J))[at]).astype(np.float64)
+    return (B + B.T) / 2
+
+
+def inside_image(key: Key, shift: NDArray[np.intp], size_px: tuple[int, int]) -> bool:
+    """Whether all its pixels, moved by ``shift`` (2,), lie in an image (width, height)."""
+    low = (int(key.x.min()) + int(shift[0]), int(key.y.min()) + int(shift[1]))
+    high = (int(key.x.max()) + int(shift[0]), int(key.y.max()) + int(shift[1]))
+    return min(low) >= 0 and high[0] < size_px[0] and high[1] < size_px[1]
+
+
+def change_of_shape(W: Floats) -> float:
+    """The larger |log| of the two stretches at the centre of W (3, 3): 0 for a move and a turn."""
+    A = W[:2, :2] - W[:2, 2:] * W[2, :2]
+    return float(np.abs(np.log(np.linalg.svd(A, compute_uv=False))).max())

@@ -1,0 +1,103 @@
+"""From frame to frame: every marker where it was, and the whole frame only now and then.
+
+Source: paper, section 3.3 (location rectangles, re-initialisation).
+"""
+
+from __future__ import annotations
+
+import json
+
+from olivevib.arrays import Floats, Grey
+from olivevib.detection import Detection, DetectionSettings, Detector
+from olivevib.marker import MarkerLibrary
+from olivevib.tracking.memory import as_bytes, hexed, pack_known, unhexed, unpack_known
+from olivevib.tracking.rectangles import read_rectangles
+
+SCAN_EVERY = 15  # frames: a marker that appears for the first time is found after so many at most
+PATIENCE = 8  # frames between whole scans while a marker stays away, at most; at first the next
+
+
+class Tracker:
+    """Follows the markers of one camera from frame to frame; not to be shared between threads.
+
+    A marker is fitted where it was; what is missing is searched in its location rectangle (the box
+    of its last corners enlarged by Δscale), then in the whole frame: at once when it went, later
+    every 2nd, 4th, 8th frame. Readers that cannot follow, the paper's and foreign ones, search
+    every rectangle and scan whenever fewer than Δmarker are found. What it found depends on the
+    frames alone and on ``memory()``, which ``recall`` restores.
+    """
+
+    def __init__(self, library: MarkerLibrary, settings: DetectionSettings | None = None) -> None:
+        self.settings = settings or DetectionSettings()
+        self._detector = Detector(library, self.settings)
+        self._follower = self._detector.follower()
+        self._ids = len(library.ids)
+        self._last: dict[int, Floats] = {}
+        self._expected = self.settings.marker
+        self._since_scan = 0
+        self._wait = 1
+
+    def update(self, grey: Grey, t_s: float) -> list[Detection]:
+        """All markers of the next frame, sorted by id; t_s is its time, later than the last."""
+        found = self._read_all(grey) if self._follower is None else self._follow(grey)
+        self._last = {i: d.corners_px for i, d in found.items()}
+        if not self.settings.marker:
+            self._expected = max(self._expected, len(found))
+        return [found[i] for i in sorted(found)]
+
+    def memory(self) -> bytes:
+        """What the tracker carries from frame to frame, to go on later as if never stopped."""
+        stored = {
+            "last": {str(i): hexed(c) for i, c in self._last.items()},
+            "expected": self._expected,
+            "since_scan": self._since_scan,
+            "wait": self._wait,
+        }
+        if self._follower is not None:
+            stored["known"] = pack_known(self._follower.known)
+        return as_bytes(stored)
+
+    def recall(self, memory: bytes) -> None:
+        """Go on from a ``memory()``."""
+        stored = json.loads(memory)
+        self._expected = int(stored["expected"])
+        self._since_scan, self._wait = int(stored["since_scan"]), int(stored["wait"])
+        self._last = {int(i): unhexed(c, (4, 2)) for i, c in stored["last"].items()}
+        if self._follower is not None:
+            self._follower.recall(unpack_known(stored["known"]))
+
+    def _read_all(self, grey: Grey) -> dict[int, Detection]:
+        """As the paper does it: rectangles, and the whole frame when too few are found."""
+        last = self._last.values()
+        found = read_rectangles(self._detector, grey, last, self.settings.scale) if last else {}
+        if len(found) < max(1, self._expected):
+            found |= {d.id: d for d in self._detector.detect(grey)}
+        return found
+
+    def _follow(self, grey: Grey) -> dict[int, Detection]:
+        assert self._follower is not None
+        found = self._follower.follow(grey)
+        gone = [corners for i, corners in self._last.items() if i not in found]
+        if gone:
+            near = read_rectangles(self._detector, grey, gone, self.settings.scale)
+            self._learn(found, near)
+        self._since_scan += 1
+        if self._must_scan(len(found), bool(gone)):
+            self._since_scan = 0
+            self._learn(found, {d.id: d for d in self._detector.detect(grey)})
+            missing = len(found) < self._expected
+            self._wait = min(2 * self._wait, PATIENCE) if missing else 1
+        return found
+
+    def _must_scan(self, found: int, gone: bool) -> bool:
+        if found >= self._ids:
+            return False
+        missing = found < max(1, self._expected)
+        wait = self._wait if missing and not gone else 1 if missing else SCAN_EVERY
+        return self._since_scan >= wait
+
+    def _learn(self, found: dict[int, Detection], more: dict[int, Detection]) -> None:
+        new = {i: d for i, d in more.items() if i not in found}
+        assert self._follower is not None
+        self._follower.learn(new.values())
+        found |= new
