@@ -6,14 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 
+from olivevib.arrays import Floats
 from olivevib.errors import Caution, InputError
 from olivevib.files.store import write_stage
 from olivevib.geometry import StereoRig
+from olivevib.pipeline.fitted import fitted_samples, with_lines
 from olivevib.pipeline.libraries import corners_mm, trial_library
 from olivevib.pipeline.motions import marker_motion, surveyed
+from olivevib.pipeline.sampling_time import (
+    TrialTimes,
+    fit_trial,
+    fitted_clock,
+    retimed,
+    steady_interval,
+)
 from olivevib.progress import Tick, silent
-from olivevib.reconstruction import TrialClock, clock_from_motion
+from olivevib.reconstruction import Reconstruction, TrialClock, clock_from_motion
 from olivevib.reconstruction import reconstruct as reconstruct_tracks
+from olivevib.reconstruction.continuous import decided, trajectory_of
 from olivevib.trial import Trial
 from olivevib.trial.records.tracks import StoredTracks
 from olivevib.trial.records.trajectory import trajectory_file
@@ -33,6 +43,8 @@ def reconstruct(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     if rig is None:
         raise trial.need("calibrate")
     _check_rig(rig, tracks)
+    if not trial.settings.reconstruction.paper:
+        tracks = retimed(trial, tracks)
     library = trial_library(trial)
     ids = {t.id for t in (*tracks.left, *tracks.right)}
     if not ids:
@@ -55,8 +67,38 @@ def reconstruct(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
             "The recordings are swapped or the same, or the rig is that of other cameras.",
             "Check left and right in trial.toml, and calibrate this pair as it stood.",
         )
+    if not (trial.settings.reconstruction.paper or _settled(trial, tracks, clock)):
+        result = with_motion(trial, tracks, rig, corners, result, tick)
     write_stage(trial.folder / "trajectory.h5", trajectory_file(result, now))
     return result.cautions
+
+
+def _settled(trial: Trial, tracks: StoredTracks, clock: TrialClock) -> bool:
+    """Whether frames alone tell all: no alias in the declared band, offset known or motion slow."""
+    band = trial.settings.vibration.band_hz
+    rate = tracks.cameras["left"].rate_hz
+    return band is not None and rate > 2 * band[1] and clock.source != "unknown"
+
+
+def with_motion(
+    trial: Trial,
+    tracks: StoredTracks,
+    rig: StereoRig,
+    corners: dict[int, Floats],
+    result: Reconstruction,
+    tick: Tick,
+) -> Reconstruction:
+    """The reconstruction with the continuous-time fit; with its paths where it could decide."""
+    facts = SamplingFacts(tracks.cameras["left"].rate_hz)
+    steady = steady_interval(result.trajectory, facts.sway_hz)
+    fit = fit_trial(trial, TrialTimes(tracks, result.clock, steady), rig, corners, tick)
+    if fit is None or not decided(fit):
+        return replace(result, motion=fit)
+    clock = fitted_clock(fit, result.clock)
+    settings = trial.settings.reconstruction
+    again = reconstruct_tracks(tracks.left, tracks.right, rig, clock, corners, settings, tick)
+    path = trajectory_of(fit, again.trajectory)
+    return replace(again, trajectory=path, motion=fit)
 
 
 def _check_rig(rig: StereoRig, tracks: StoredTracks) -> None:
@@ -165,8 +207,13 @@ def analyse(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     settings = VibrationSettings(window=trial.settings.vibration.window)
     facts = sampling_facts(trial, reconstruction.clock)
     phases = [Phase(*row) for row in trial.settings.vibration.phases] or None
+    fit = reconstruction.motion
+    if fit is not None and decided(fit):
+        motion, facts, phases = fitted_samples(fit, motion, facts)
     result = analyse_motion(motion, facts, settings, phases, tick)
     result = replace(result, cautions=(*result.cautions, *cautions))
+    if fit is not None:
+        result = with_lines(result, fit)
     if reconstruction.clock.source == "unknown" and not facts.direct:
         result = _unproven(result)
     result = replace(result, survey=surveyed(trial, trajectory, motion, result, facts))

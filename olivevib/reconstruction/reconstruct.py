@@ -12,6 +12,7 @@ from olivevib.errors import Caution
 from olivevib.geometry import StereoRig
 from olivevib.progress import Tick, silent
 from olivevib.reconstruction.clock import TrialClock
+from olivevib.reconstruction.motion.types import MotionFit
 from olivevib.reconstruction.pairing import View, as_seen, at_times, same_count
 from olivevib.reconstruction.pose import rotations
 from olivevib.reconstruction.trajectory import Trajectory
@@ -40,7 +41,8 @@ class Reconstruction:
     """The trajectory, the clock it stands on, and what its sigmas were scaled by.
 
     sigma_scale: factor (>= 1) on all sigmas, the rms epipolar residual in units of its sigma.
-    epipolar_rms_px: over all samples; NaN without samples.
+    epipolar_rms_px: over all samples; NaN without samples. motion: the continuous-time fit, where
+    one was made, whether it could decide or not.
     """
 
     trajectory: Trajectory
@@ -48,6 +50,7 @@ class Reconstruction:
     sigma_scale: float
     epipolar_rms_px: float
     cautions: tuple[Caution, ...] = field(default=())
+    motion: MotionFit | None = None
 
 
 def reconstruct(

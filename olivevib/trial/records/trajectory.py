@@ -9,8 +9,10 @@ import numpy as np
 from olivevib.arrays import Floats
 from olivevib.files.store import StageFile, Variable
 from olivevib.reconstruction import Reconstruction, Trajectory, TrialClock
+from olivevib.reconstruction.continuous import stored_fit
 from olivevib.signals import State
 from olivevib.trial.records.cautions import cautions_from, cautions_text
+from olivevib.trial.records.motion import motion_columns, motion_from, motion_text
 from olivevib.trial.stages import BY_NAME, Fingerprint
 
 STAGE = BY_NAME["reconstruct"]
@@ -41,11 +43,13 @@ def trajectory_file(result: Reconstruction, now: Fingerprint) -> StageFile:
             ),
             "state": Variable(nm, t.state, "1", "why a sample is there or not", WORDS),
             "epipolar": Variable(nm, t.epipolar_px, "px", "epipolar residual"),
+            **(motion_columns(result.motion) if result.motion else {}),
         },
         attributes={
             "frame": t.frame,
             "method": t.method,
             "clock": json.dumps(_clock(result.clock)),
+            "motion": motion_text(result.motion) if result.motion else "",
             "sigma_scale": result.sigma_scale,
             "epipolar_rms_px": result.epipolar_rms_px,
             "cautions": cautions_text(result.cautions),
@@ -72,6 +76,9 @@ def reconstruction_from(file: StageFile) -> Reconstruction:
     def get(name: str) -> Floats:
         return np.asarray(file.variables[name].values)
 
+    motion = motion_from(file)
+    method = str(file.attributes["method"])
+    fits = tuple(stored_fit(motion, m) for m in motion.markers) if motion else ()
     trajectory = Trajectory(
         t_s=get("time"),
         ids=get("marker").astype(np.int64),
@@ -84,7 +91,8 @@ def reconstruction_from(file: StageFile) -> Reconstruction:
         state=get("state").astype(np.int64),
         epipolar_px=get("epipolar"),
         frame=str(file.attributes["frame"]),
-        method=str(file.attributes["method"]),
+        method=method,
+        fits=fits if method == "continuous" else (),
     )
     return Reconstruction(
         trajectory=trajectory,
@@ -92,4 +100,5 @@ def reconstruction_from(file: StageFile) -> Reconstruction:
         sigma_scale=float(file.attributes["sigma_scale"]),
         epipolar_rms_px=float(file.attributes["epipolar_rms_px"]),
         cautions=cautions_from(file.attributes["cautions"]),
+        motion=motion,
     )

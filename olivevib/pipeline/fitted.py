@@ -1,0 +1,172 @@
+"""Lines and figures of a trial whose motion was fitted in continuous time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from olivevib.errors import Caution
+from olivevib.reconstruction.continuous import FINER, decided, interval_s
+from olivevib.reconstruction.motion import MarkerMotion as FittedMarker
+from olivevib.reconstruction.motion import MotionFit
+from olivevib.signals import Samples
+from olivevib.vibration import (
+    CandidateMotion,
+    Line,
+    LineStatus,
+    MarkerMotion,
+    Phase,
+    SamplingFacts,
+    Vibration,
+)
+from olivevib.vibration.analysis import scaled_line
+from olivevib.vibration.clock import between
+from olivevib.vibration.kinematics import QUANTITIES, UNITS, line_motion
+
+OPEN = (LineStatus.AMBIGUOUS, LineStatus.ALIASED)
+CANDIDATES = 5
+UNLIKELY = 1e-3  # a candidate below that probability is not listed
+
+
+def fitted_samples(
+    fit: MotionFit, motion: Mapping[int, Samples], facts: SamplingFacts
+) -> tuple[dict[int, Samples], SamplingFacts, list[Phase]]:
+    """The motion inside the fit, facts of its fine grid, and its interval as the steady phase.
+
+    The exposure is corrected in the fit. A marker that was not fitted is left without samples: at
+    the frame rate its frequency could not be told.
+    """
+    start, end = interval_s(fit)
+    mine = {m.id for m in fit.markers}
+    parts = {
+        i: between(s, start, end) if i in mine else between(s, start, start)
+        for i, s in motion.items()
+    }
+    fine = replace(facts, frame_rate_hz=facts.frame_rate_hz * FINER, exposure_s=0.0)
+    return parts, fine, [Phase("steady", start, end)]
+
+
+def with_lines(result: Vibration, fit: MotionFit) -> Vibration:
+    """The analysis with the fit's frequency, status, candidates and amplitudes in its lines.
+
+    Where the fit could not decide, the amplitudes stay those of the triangulated paths.
+    """
+    if not np.isfinite(fit.f_hz):
+        return result
+    markers = {m.id: m for m in fit.markers}
+    table = tuple(_row(row, fit, markers.get(row.id)) for row in result.table)
+    spectra = {}
+    for n, quantity in enumerate(QUANTITIES):
+        spectrum = result.spectra[quantity]
+        lines = [
+            _line(line, fit, markers.get(int(i)), n)
+            for i, line in zip(spectrum.ids, spectrum.lines, strict=True)
+        ]
+        spectra[quantity] = replace(spectrum, lines=tuple(lines))
+    kept = [c for c in result.cautions if c.code not in _CODES]
+    return replace(result, table=table, spectra=spectra, cautions=(*kept, *_cautions(fit)))
+
+
+def _row(row: MarkerMotion, fit: MotionFit, marker: FittedMarker | None) -> MarkerMotion:
+    line = _line(row.line, fit, marker, 0)
+    figures = {}
+    for n, quantity in enumerate(QUANTITIES):
+        part = scaled_line(line, n)
+        figures[quantity] = replace(
+            getattr(row, quantity),
+            line_amplitude=part.amplitude,
+            line_amplitude_sigma=part.sigma,
+            thd_percent=part.thd_percent,
+        )
+    candidates = tuple(_candidate(line, f) for f in line.candidates_hz)
+    return replace(row, line=line, candidates=candidates, **figures)
+
+
+def _candidate(line: Line, f_hz: float) -> CandidateMotion:
+    x, v, a = (line_motion(line, n, f_hz).amplitude for n in range(3))
+    return CandidateMotion(f_hz, x, v, a, float(np.sqrt(np.sum(a**2) / 2)))
+
+
+def _line(line: Line, fit: MotionFit, marker: FittedMarker | None, derivative: int) -> Line:
+    """The line of one marker in the n-th derivative as the fit sees it."""
+    if marker is None or not np.isfinite(fit.f_hz):
+        return line
+    told = replace(
+        line,
+        status=fit.status,
+        reasons=(*fit.reasons, *fit.next_time),
+        **_frequencies(fit),
+    )
+    if not decided(fit):
+        return told
+    base = replace(told, unit="mm", **_amplitudes(fit, marker))
+    if derivative == 0:
+        return base
+    scaled = scaled_line(base, derivative)
+    return replace(
+        base,
+        unit=UNITS[QUANTITIES[derivative]],
+        amplitude=scaled.amplitude,
+        amplitude_sigma=scaled.sigma,
+        phase_rad=base.phase_rad + derivative * np.pi / 2,
+        harmonics=scaled.harmonics,
+    )
+
+
+def _frequencies(fit: MotionFit) -> dict[str, Any]:
+    """Frequency, candidates (ascending) and their probabilities."""
+    sigma = fit.timing.sigma("frequency_hz")
+    table = fit.branches
+    if decided(fit) or not table.f_hz.size:
+        return {"f_hz": fit.f_hz, "f_sigma_hz": sigma, "candidates_hz": (fit.f_hz,)}
+    likely = np.flatnonzero(~(table.probability < UNLIKELY))[:CANDIDATES]
+    order = likely[np.argsort(table.f_hz[likely])]
+    frequencies = tuple(float(f) for f in table.f_hz[order])
+    chance = tuple(float(p) for p in table.probability[order])
+    weighed = fit.status is LineStatus.AMBIGUOUS and bool(np.isfinite(chance).all())
+    return {
+        "f_hz": frequencies[0],
+        "f_sigma_hz": sigma,
+        "candidates_hz": frequencies,
+        "probabilities": chance if weighed else (),
+    }
+
+
+def _amplitudes(fit: MotionFit, marker: FittedMarker) -> dict[str, Any]:
+    """Amplitudes, sigmas, phases of the fundamental and amplitudes of the harmonics."""
+    size = np.hypot(marker.cosine, marker.sine)[:, :3]
+    sigma = marker.amplitude_sigma()[:, :3]
+    phase = np.arctan2(-marker.sine[0, :3], marker.cosine[0, :3])
+    lost = np.array(marker.blind, dtype=np.bool_) | bool(fit.amplitude_refused)
+    size = np.where(lost[:, None], np.nan, size)
+    sigma = np.where(lost[:, None], np.nan, sigma)
+    return {
+        "amplitude": size[0],
+        "amplitude_sigma": sigma[0],
+        "phase_rad": phase,
+        "t_ref_s": fit.mid_s + fit.shift_s,
+        "harmonics": size[1:],
+    }
+
+
+_CODES = ("frequency-undecided", "frequency-blind", "frequency-chirp", "exposure-blur")
+
+
+def _cautions(fit: MotionFit) -> list[Caution]:
+    remedy = " ".join(fit.next_time)
+    why = " ".join(fit.reasons)
+    code = {
+        LineStatus.AMBIGUOUS: "frequency-undecided",
+        LineStatus.ALIASED: "frequency-undecided",
+        LineStatus.BLIND: "frequency-blind",
+        LineStatus.CHIRP: "frequency-chirp",
+    }.get(fit.status)
+    out = [Caution(code, why, remedy)] if code else []
+    if fit.status is LineStatus.SUPPORTED:
+        out.append(Caution("frequency-supported", why, remedy))
+    if fit.amplitude_refused:
+        out.append(Caution("exposure-too-long", fit.amplitude_refused, remedy))
+    return out
