@@ -404,14 +404,17 @@ def test_sigmas_of_points_and_lengths():
 
 def test_widening_never_narrows():
     rng = np.random.default_rng(4)
-    A = rng.normal(size=(6, 6))
-    model = np.linalg.inv(A @ A.T + 6 * np.eye(6))
     prior = 0.1 * np.eye(6)
     for count, size in ((30, 0.2), (30, 3.0), (4, 1.0)):
-        pulls = rng.normal(size=(count, 6)) * size
-        wide = widen(model, pulls, prior)
+        A = rng.normal(size=(count, 9, 6))
+        H = A.transpose(0, 2, 1) @ A
+        g = size * (A.transpose(0, 2, 1) @ rng.normal(size=(count, 9, 1)))[:, :, 0]
+        model = np.linalg.inv(H.sum(axis=0) + prior)
+        wide = widen(model, H, g, prior)
         assert np.linalg.eigvalsh(wide - model).min() > -1e-9
         assert np.allclose(wide, wide.T)
+        if size == 3.0:
+            assert 4 < np.trace(wide) / np.trace(model) < 16
 
 
 def spread(count, what):

@@ -11,6 +11,7 @@ from capture_cameras import jpeg
 from rendered_markers import Canvas, Look
 from small_videos import make_video
 
+from olivevib.calibration.guidance import Guide, tilts_of
 from olivevib.calibration.views import BoardView
 from olivevib.cli.capture import status_line
 from olivevib.detection import Detector
@@ -18,7 +19,6 @@ from olivevib.files.capture import Beat, CameraFacts, Controls, Mode, Shot
 from olivevib.geometry import CameraModel, rotation_from_vector
 from olivevib.marker import load_library
 from olivevib.pipeline.capture import (
-    BoardCoverage,
     CameraResult,
     CapturePlan,
     Prompter,
@@ -28,7 +28,6 @@ from olivevib.pipeline.capture import (
     judge,
     rehearsal,
 )
-from olivevib.pipeline.capture.coverage import tilts_of
 from olivevib.pipeline.capture.looks import grey_of_shot, look_at
 from olivevib.pipeline.capture.prompts import MotionSense
 from olivevib.pipeline.capture.verdict import camera_offset_s, judge_board
@@ -214,15 +213,15 @@ def test_tilts_are_named_by_the_nearer_side():
 
 
 def test_coverage_says_where_to_go_next_and_when_it_is_enough():
-    coverage = BoardCoverage()
+    coverage = Guide()
     assert "left picture" in coverage.state().words
     size, t = (1280, 720), 0.0
     for turn in ((0.0, 0.5, 0.0), (0.0, -0.5, 0.0), (0.5, 0.0, 0.0)):
         for x in (160, 480, 800, 1120):
             for y in (150, 360, 570):
-                t += 0.5
-                coverage.add("left", view(t, (x, y), turn), size)
-                coverage.add("right", view(t + 0.01, (x, y), turn), size)
+                t, far = t + 0.5, 700.0 if x < 640 else 1100.0
+                coverage.add("left", view(t, (x, y), turn, far), size)
+                coverage.add("right", view(t + 0.01, (x, y), turn, far), size)
         told = coverage.state()
         if turn[1] > 0:
             assert not told.enough
@@ -234,7 +233,7 @@ def test_coverage_says_where_to_go_next_and_when_it_is_enough():
 
 
 def test_views_that_show_nothing_new_are_not_counted():
-    coverage = BoardCoverage()
+    coverage = Guide()
     for k in range(50):
         coverage.add("left", view(k * 0.3, (640, 360)), (1280, 720))
         coverage.add("right", view(k * 0.3, (640, 360)), (1280, 720))

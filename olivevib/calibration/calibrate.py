@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from olivevib.calibration.bundle import RIGHT
+from olivevib.calibration.closed_form import fixes_homography
 from olivevib.calibration.gather import gather, published_rig
 from olivevib.calibration.holdout import HoldOut, common_pairs, measure, with_tracks, without
 from olivevib.calibration.joint import Pair, fit_joint, fit_single, make_pair
 from olivevib.calibration.outliers import Cleaned, drop_outliers
 from olivevib.calibration.quality import halves_test
-from olivevib.calibration.result import Calibration
+from olivevib.calibration.result import Calibration, ViewUse
 from olivevib.calibration.settings import CalibrationSettings
 from olivevib.calibration.thin import thin
 from olivevib.calibration.uncertainty import uncertainty
@@ -21,6 +24,7 @@ from olivevib.geometry import CameraModel
 from olivevib.progress import Tick, silent
 
 Size = tuple[int, int]
+UNFIT = "its points do not fix a homography: fewer than four, or all but one in line"
 LEAST_TEST_FRAMES = 6  # common frames below which none is kept for the test
 
 
@@ -39,7 +43,31 @@ def calibrate(
     Degenerates (cautions say so) where the board is never tilted or always equally far.
     """
     settings = settings or CalibrationSettings()
-    pair = make_pair_checked(left, right, (size_left, size_right), settings)
+    fit_left, fit_right = ([v for v in views if fixes_homography(v)] for views in (left, right))
+    pair = make_pair_checked(fit_left, fit_right, (size_left, size_right), settings)
+    try:
+        result = _calibrated(pair, settings, tick)
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            "The board views do not determine the cameras.",
+            "They are too few, all alike, or their points lie in line.",
+            "Show the whole board to both cameras in 10 or more places, tilted, near and far.",
+        ) from error
+    return replace(result, views=(*result.views, *_unfit(left, "left"), *_unfit(right, "right")))
+
+
+def _unfit(views: Sequence[BoardView], side: str) -> list[ViewUse]:
+    """Views with too few points, or all but one in line."""
+    nan = float("nan")
+    return [
+        ViewUse(side, view.frame, view.t_s, view.ids.size, False, UNFIT, nan)
+        for view in views
+        if not fixes_homography(view)
+    ]
+
+
+def _calibrated(pair: Pair, settings: CalibrationSettings, tick: Tick) -> Calibration:
+    """Test, solve, ask both halves, judge."""
     tick(0, 4, "testing on unused frames")
     tested = cross_validate(pair, settings, tick)
     tick(1, 4, "solving with all frames")
@@ -53,7 +81,17 @@ def calibrate(
 def fit_all(pair: Pair, settings: CalibrationSettings, tick: Tick = silent) -> Cleaned:
     """Single lenses, joint solve, outliers dropped."""
     fit = fit_joint(pair, settings, fit_single(pair, settings), tick)
-    return drop_outliers(fit, settings)
+    cleaned = drop_outliers(fit, settings)
+    obs = cleaned.fit.problem.observations
+    shared = np.unique(obs.pose[obs.chain == RIGHT]).size
+    if shared < settings.least_pairs:
+        raise InputError(
+            f"Only {shared} views could be used of both cameras together; at least "
+            f"{settings.least_pairs} are needed.",
+            "The others do not fit, or the board was lost just when the other camera saw it.",
+            "Show the whole board to both cameras at once in 10 or more places, and hold it there.",
+        )
+    return cleaned
 
 
 def make_pair_checked(

@@ -119,14 +119,14 @@ def posed(side: Side, pick: Ints, camera: CameraModel) -> State:
 
 def planar_pose(board_mm: Floats, rays: Floats) -> tuple[Floats, Floats]:
     """Rotation (3, 3) and translation (3,) of a flat board from viewing rays (N, 3), N >= 4."""
-    H = homography(board_mm[:, :2], rays[:, :2])
-    scale = 2 / (np.linalg.norm(H[:, 0]) + np.linalg.norm(H[:, 1]))
-    H = H * (scale if H[2] @ np.append(board_mm[:, :2].mean(axis=0), 1.0) > 0 else -scale)
+    middle = board_mm.mean(axis=0)
+    H = homography((board_mm - middle)[:, :2], rays[:, :2])  # H33 = 1: the middle is in front
+    H = H * (2 / (np.linalg.norm(H[:, 0]) + np.linalg.norm(H[:, 1])))
     R = nearest_rotation(np.column_stack([H[:, 0], H[:, 1], np.cross(H[:, 0], H[:, 1])]))
-    depth = board_mm @ R[2] + H[2, 2]
+    depth = (board_mm - middle) @ R[2] + H[2, 2]
     if depth.min() < 0.2 * depth.max():  # few points, almost in line: no pose to trust
         return frontal_pose(board_mm, rays)
-    return R, H[:, 2]
+    return R, H[:, 2] - R @ middle
 
 
 def frontal_pose(board_mm: Floats, rays: Floats) -> tuple[Floats, Floats]:

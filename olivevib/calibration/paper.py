@@ -14,7 +14,7 @@ import numpy as np
 from olivevib.arrays import Floats
 from olivevib.calibration.assemble import BoardShape, Side, Table, table_of
 from olivevib.calibration.bundle import State
-from olivevib.calibration.calibrate import LEAST_TEST_FRAMES, Size, make_pair_checked
+from olivevib.calibration.calibrate import LEAST_TEST_FRAMES, UNFIT, Size, make_pair_checked
 from olivevib.calibration.closed_form import (
     ClosedForm,
     fixes_homography,
@@ -35,7 +35,6 @@ from olivevib.geometry import StereoRig
 from olivevib.progress import Tick, silent
 
 NAN = float("nan")
-UNFIT = "its points do not fix a homography: fewer than four, or all but one in line"
 
 
 @dataclass(frozen=True)

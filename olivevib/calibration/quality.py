@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from olivevib.arrays import Bools, Floats
-from olivevib.calibration.bundle import BOW, LAG, LENS_OF
+from olivevib.calibration.bundle import BOW, LAG, LENS_OF, RIGHT
 from olivevib.calibration.coverage import Coverage
 from olivevib.calibration.holdout import HoldOut
 from olivevib.calibration.joint import JointFit
@@ -19,18 +19,20 @@ from olivevib.errors import Caution
 from olivevib.geometry import LENS
 
 FEW_COMMON = 10
+LEAST_HALF = 5  # common views that a half needs to tell a rig
 SIDES = ("left", "right")
 
 
 def halves_test(fit: JointFit) -> tuple[HalfTest, ...]:
     """First against second half, and even against odd views: whether they tell the same lens."""
-    seen = np.unique(fit.problem.observations.pose)
-    if seen.size < 12:
-        return ()
+    obs = fit.problem.observations
+    seen, shared = np.unique(obs.pose), np.unique(obs.pose[obs.chain == RIGHT])
     order = np.arange(seen.size)
     splits = {"first and second half": order < seen.size // 2, "even and odd views": order % 2 == 0}
     out = []
     for name, first in splits.items():
+        if min(np.isin(seen[part], shared).sum() for part in (first, ~first)) < LEAST_HALF:
+            continue
         both = [_half(fit, seen[part]) for part in (first, ~first)]
         (a, cov_a), (b, cov_b) = both
         at = np.r_[0:4, 6:10]  # focal lengths and principal points of both cameras

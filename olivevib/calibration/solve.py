@@ -187,8 +187,9 @@ def step(problem: Problem, reduced: Reduced, damping: float) -> tuple[Floats, Fl
     H, g = reduced.total_H, reduced.total_g
     theta = np.zeros(len(THETA))
     if g.size:
-        scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-        scaled = H * np.outer(scale, scale) + damping * np.eye(g.size)
+        known = np.diag(H) > 0
+        scale = 1 / np.sqrt(np.where(known, np.diag(H), 1.0))
+        scaled = H * np.outer(scale, scale) + np.diag(damping + 1e-13 + ~known)
         theta[problem.free] = -scale * np.linalg.solve(scaled, scale * g)
     move = theta[problem.free]
     pose = -(reduced.pose[:, :, -1] + reduced.pose[:, :, :-1] @ move)

@@ -41,6 +41,8 @@ def _expected(rig: StereoRig, distance_mm: float, sigma_px: tuple[float, float])
         return ""
     at = working_point(rig, distance_mm)
     sigma = point_sigma(rig, at, sigma_px)
+    if not np.isfinite(sigma.frame_mm).all():
+        return ""
     half = np.array([[100.0, 0.0, 0.0]])
     length = float(length_sigma(rig, at - half, at + half)[0])
     frame = " / ".join(_two(v) for v in sigma.frame_mm[0])

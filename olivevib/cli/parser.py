@@ -95,6 +95,12 @@ def _prepare_verbs(verbs: Any) -> None:
     new.add_argument("--accelerometer-marker", type=int, metavar="ID", help="where it was fixed")
     new.add_argument("--preset", metavar="NAME", help="how it is read (olivevib preset)")
     new.add_argument("--link", action="store_true", help="leave the recordings where they are")
+    _set_option(new)
+    archive = _add(
+        verbs, "archive", "prepare:archive", "leave a trial out of lists, or take it back"
+    )
+    archive.add_argument("trials", nargs="+", metavar="TRIAL")
+    archive.add_argument("--undo", action="store_true", help="take it back into lists")
     preset = _add(verbs, "preset", "prepare:preset", "keep how an accelerometer file is read")
     preset.add_argument("trial", metavar="TRIAL", help="its [[accelerometers]] say how")
     preset.add_argument("name", metavar="NAME", help="becomes presets/NAME.toml")
@@ -119,6 +125,9 @@ def _capture_verb(verbs: Any) -> None:
     parser.add_argument("--marker-size", type=float, metavar="MM", help=_SIZE)
     parser.add_argument("--band", metavar="5-45", help="where the shaker's frequency may lie, Hz")
     parser.add_argument("--no-preview", action="store_true", help="decode nothing while recording")
+    parser.add_argument(
+        "--wait", action="store_true", help="run the cameras until Enter, then record"
+    )
 
 
 _CAPTURE_MORE = """\
@@ -175,6 +184,10 @@ def _stage_verbs(verbs: Any) -> None:
         stage = _add(verbs, name, "stages:one", help_)
         stage.add_argument("trials", nargs="+", metavar="TRIAL")
         stage.add_argument("--paper", action="store_true", help="as the paper of 2011 does it")
+        if name == "calibrate":
+            look = stage.add_mutually_exclusive_group()
+            look.add_argument("--preview", action="store_true", help=_PREVIEW)
+            look.add_argument("--sigma", action="store_true", help=_SIGMA_MAP)
         _set_option(stage)
         stage.set_defaults(stage=name)
     run = _add(verbs, "run", "stages:run", "every stage that is missing or stale, in order")
@@ -188,6 +201,8 @@ def _stage_verbs(verbs: Any) -> None:
     batch.add_argument("--json", action="store_true", help="results as JSON, for programs")
 
 
+_PREVIEW = "only show what the board recordings cover, and what is still to be shown"
+_SIGMA_MAP = "only print the sigma to expect over the working volume, from rig.toml (CSV)"
 _BATCH = """\
 prints a line a trial: its name and the hash of its results, equal wherever it was measured.
 What is done is skipped; the same command goes on after Ctrl-C, a kill or a power cut.
@@ -208,7 +223,9 @@ def _set_option(parser: Any) -> None:
 
 def _result_verbs(verbs: Any) -> None:
     show = _add(verbs, "show", "results:show", "state and headline numbers of a trial")
-    show.add_argument("trial", metavar="TRIAL")
+    show.add_argument(
+        "trial", nargs="?", metavar="TRIAL", help="without: all trials here, a line each"
+    )
     show.add_argument("--json", action="store_true", help="everything, for programs")
     report = _add(verbs, "report", "results:report", "one self-contained page a trial")
     report.add_argument("trials", nargs="+", metavar="TRIAL")
@@ -247,6 +264,12 @@ _LAMP = """\
 Let an LED flash at a known frequency, such as 500 Hz (no multiple of half the frame rate), through
 paper right before the lens, with an exposure of less than half a flash. Record some seconds with
 olivevib capture. Stripes must travel over the picture.
+"""
+
+
+_SERVE = """\
+needs the extra textual-serve: pip install 'olivevib[serve]'. Whoever reaches the port can do in the
+workspace whatever the app can; without --host only this computer does.
 """
 
 
@@ -298,5 +321,8 @@ def _other_verbs(verbs: Any) -> None:
     rowtime.add_argument("--camera", metavar="NAME", help="whose it is, where the file cannot say")
     _plan_verb(verbs)
     _study_verbs(verbs)
+    serve = _add(verbs, "serve", "serve:serve", "the app in a browser", _SERVE)
+    serve.add_argument("--host", default="127.0.0.1", metavar="NAME", help="default: 127.0.0.1")
+    serve.add_argument("--port", type=int, default=8000, metavar="N", help="default: 8000")
     doctor = _add(verbs, "doctor", "doctor:doctor", "what works on this machine")
     doctor.add_argument("--json", action="store_true", help="for programs")

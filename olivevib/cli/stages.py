@@ -28,6 +28,11 @@ def one(arguments: argparse.Namespace, console: Console) -> int:
     changes = values.settings(arguments.set)
     if arguments.paper:
         changes |= PAPER_KEYS[arguments.stage]
+    if arguments.stage == "calibrate" and (arguments.preview or arguments.sigma):
+        from olivevib.cli import calibration
+
+        verb = calibration.preview if arguments.preview else calibration.sigma
+        return max(verb(_open(name, changes, console), console) for name in arguments.trials)
     warned = 0
     for name in arguments.trials:
         trial = _open(name, changes, console)

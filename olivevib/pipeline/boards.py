@@ -54,9 +54,27 @@ def trial_board(trial: Trial) -> Board:
     return parse_board(spec)
 
 
+def board_paths(trial: Trial) -> dict[str, Path]:
+    """Both board recordings, or UsageError where trial.toml names none."""
+    named = {s: getattr(trial.settings.calibration, s) for s in SIDES}
+    missing = [side for side, name in named.items() if not name]
+    if missing:
+        raise UsageError(
+            f"the {missing[0]} recording of the calibration board is not known.",
+            "calibration.left and calibration.right of trial.toml name both.",
+            "Name it: --set calibration.left=PATH --set calibration.right=PATH.",
+        )
+    return {s: trial.path(str(name)) for s, name in named.items()}
+
+
+def board_finder(trial: Trial, board: Board) -> BoardFinder:
+    """What finds the trial's board in a picture; one for each camera."""
+    return BoardFinder(board, board_reader(trial, board))
+
+
 def find_boards(trial: Trial, board: Board, tick: Tick) -> dict[str, BoardRecording]:
     """Look for the board in every frame of both recordings, one thread a camera."""
-    paths = {s: trial.path(str(getattr(trial.settings.calibration, s))) for s in SIDES}
+    paths = board_paths(trial)
     seen: dict[str, list[_Seen]] = {side: [] for side in SIDES}
     notes: dict[str, _Note] = {}
     makers = {side: partial(_look, trial, board, paths[side], side, notes) for side in SIDES}
@@ -89,7 +107,7 @@ class _Note:
 def _look(
     trial: Trial, board: Board, path: Path, side: str, notes: dict[str, _Note]
 ) -> Iterator[_Seen]:
-    finder = BoardFinder(board, board_reader(trial, board))
+    finder = board_finder(trial, board)
     with open_source(path, side) as source:
         every = max(1, (source.count_hint or 200) // SAMPLE_FRAMES)
         for frame in source.frames():

@@ -129,6 +129,8 @@ def _facts(recordings: dict[str, BoardRecording], result: Calibration) -> dict[s
             "holdout_method": h.method,
         }
     facts |= {
+        "point_sigma_px": [float(v) for v in result.point_sigma_px],
+        "board_distance_mm": float(np.median(result.left_coverage.distance_mm)),
         "jitter_s": result.jitter_s,
         "bow_mm": result.bow_mm.tolist(),
         "bow_sigma_mm": result.bow_sigma_mm.tolist(),

@@ -1,13 +1,14 @@
 """Recording a trial: what the command line and the app share."""
 
-from olivevib.pipeline.capture.coverage import BoardCoverage, Coverage
 from olivevib.pipeline.capture.looks import Look, advise
 from olivevib.pipeline.capture.plan import (
     CameraState,
     Captured,
     CapturePlan,
     CaptureState,
+    Hold,
     Watch,
+    at_once,
     unwatched,
 )
 from olivevib.pipeline.capture.prompts import Prompt, Prompter
@@ -16,19 +17,19 @@ from olivevib.pipeline.capture.trial import board_in, place_of, trial_from
 from olivevib.pipeline.capture.verdict import CameraResult, Verdict, good_for, judge
 
 __all__ = [
-    "BoardCoverage",
     "CameraResult",
     "CameraState",
     "CapturePlan",
     "CaptureState",
     "Captured",
-    "Coverage",
+    "Hold",
     "Look",
     "Prompt",
     "Prompter",
     "Verdict",
     "Watch",
     "advise",
+    "at_once",
     "board_in",
     "capture",
     "good_for",

@@ -14,10 +14,10 @@ import numpy as np
 from olivevib.arrays import Grey
 from olivevib.calibration.boards import Board
 from olivevib.calibration.finding import BoardFinder
+from olivevib.calibration.guidance import Guidance, Guide
 from olivevib.detection import Detector
 from olivevib.files.capture import CameraRunner, Shot
 from olivevib.marker import MarkerLibrary
-from olivevib.pipeline.capture.coverage import BoardCoverage, Coverage
 from olivevib.pipeline.capture.looks import Look, grey_of_shot, look_at
 from olivevib.pipeline.capture.prompts import MotionSense
 
@@ -53,7 +53,7 @@ class Looker:
         self._detector = Detector(library)
         reader = self._detector if board is not None and board.kind == "coded" else None
         self._finder = None if board is None else BoardFinder(board, reader)
-        self._coverage = None if board is None else BoardCoverage()
+        self._coverage = None if board is None else Guide()
         self._senses = {side: MotionSense() for side in runners}
         self._counts: dict[str, Counter[int]] = {side: Counter() for side in runners}
         self._looks: dict[str, list[Look]] = {side: [] for side in runners}
@@ -84,7 +84,7 @@ class Looker:
         known = [m for m in said if m is not None]
         return any(known) if known else None
 
-    def coverage(self) -> Coverage | None:
+    def coverage(self) -> Guidance | None:
         """How well the board was shown; None where a tree is recorded."""
         with self._lock:
             return None if self._coverage is None else self._coverage.state()

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from olivevib.arrays import Grey
+from olivevib.calibration.guidance import Guidance
 from olivevib.errors import Caution, OlivevibError
 from olivevib.files.capture import CameraFacts, Controls, Mode
-from olivevib.pipeline.capture.coverage import Coverage
 from olivevib.pipeline.capture.looks import Look
 from olivevib.pipeline.capture.prompts import Prompt
 from olivevib.pipeline.capture.verdict import Verdict
@@ -75,7 +75,7 @@ class CaptureState:
     free_bytes: int
     minutes_left: float
     prompt: Prompt | None
-    coverage: Coverage | None
+    coverage: Guidance | None
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,12 @@ class Captured:
 
 
 Watch = Callable[[CaptureState], None]
+Hold = Callable[[], bool]
+
+
+def at_once() -> bool:
+    """Hold nothing back: record as soon as both cameras deliver."""
+    return False
 
 
 def unwatched(state: CaptureState) -> None:

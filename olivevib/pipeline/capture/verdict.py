@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from olivevib.arrays import Floats
+from olivevib.calibration.guidance import Guidance
 from olivevib.errors import Caution
-from olivevib.pipeline.capture.coverage import Coverage
 from olivevib.pipeline.capture.looks import BLUR_PX, SATURATED_SHARE
 from olivevib.signals import StampFit, fit_stamps
 
@@ -79,7 +79,7 @@ def judge(
     return Verdict(f"{', '.join(parts)}: {reach}", offset, fits, tuple(cautions))
 
 
-def judge_board(results: Sequence[CameraResult], coverage: Coverage | None) -> Verdict:
+def judge_board(results: Sequence[CameraResult], coverage: Guidance | None) -> Verdict:
     """The verdict on a recording of the calibration board."""
     fits = {r.side: _fit(r.stamps_s) for r in results}
     cautions = [c for r in results for c in _camera_cautions(r, fits[r.side])]
@@ -101,7 +101,7 @@ def judge_board(results: Sequence[CameraResult], coverage: Coverage | None) -> V
     return Verdict(words, math.nan, fits, tuple(cautions))
 
 
-def _cells(coverage: Coverage) -> list[tuple[str, float]]:
+def _cells(coverage: Guidance) -> list[tuple[str, float]]:
     return sorted(coverage.cells.items())
 
 
