@@ -15,10 +15,11 @@ from rich.cells import cell_len
 
 from olivevib.errors import InputError, UsageError
 from olivevib.progress import Cancelled
+from olivevib.trial.quality import StageLine
 from olivevib.tui.app import OlivevibApp
 from olivevib.tui.harmless import REPLACEMENT, harmless, plain
 from olivevib.tui.kept import Kept, place_of, read_kept, write_kept
-from olivevib.tui.loader import Quality, StageLine, TrialRow
+from olivevib.tui.loader import TrialRow
 from olivevib.tui.plan import FIELDS, guesses, plan_of, trial_name
 from olivevib.tui.screens.error import error_text
 from olivevib.tui.themes import palette_of
@@ -173,7 +174,7 @@ def test_a_damaged_file_gives_the_defaults(tmp_path, text):
 
 def row(name: str, word: str = "clean", about: str = "Bari") -> TrialRow:
     stages = (StageLine("track", "stale", "the setting detection.fill changed"),)
-    return TrialRow(Path(name), name, stages, Quality(word, "why"), about)
+    return TrialRow(Path(name), name, stages, word, "why", about)
 
 
 def test_search_takes_every_word_anywhere():

@@ -6,6 +6,8 @@ import argparse
 import contextlib
 import math
 import signal
+import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
@@ -17,13 +19,13 @@ from olivevib.errors import OlivevibError, UsageError
 from olivevib.progress import Cancelled
 
 if TYPE_CHECKING:
-    from olivevib.pipeline.capture import CameraState, CapturePlan, CaptureState
+    from olivevib.pipeline.capture import CameraState, CapturePlan, CaptureState, Hold
 
 
 def capture(arguments: argparse.Namespace, console: Console) -> int:
     """Record a tree or the calibration board with both cameras, and make the trial."""
+    from olivevib.pipeline.capture import at_once, place_of, trial_from
     from olivevib.pipeline.capture import capture as record
-    from olivevib.pipeline.capture import place_of, trial_from
 
     plan = _plan(arguments)
     folder = _folder(arguments.trial)
@@ -32,7 +34,8 @@ def capture(arguments: argparse.Namespace, console: Console) -> int:
     console.say(f"Recording {'the board' if plan.board else 'the tree'} into {place} {how}.")
     with _stopping() as stop:
         watch = _Watcher(console, stop)
-        captured = record(place, plan, watch, console.tick)
+        hold = _until_enter(console) if arguments.wait else at_once
+        captured = record(place, plan, watch, console.tick, hold)
     cut_short = stop.asked and plan.seconds is not None
     print(captured.verdict.words)
     warned = console.cautions(captured.cautions)
@@ -86,6 +89,19 @@ def _plan(arguments: argparse.Namespace) -> CapturePlan:
     )
 
 
+def _until_enter(console: Console) -> Hold:
+    """Hold the recording back until somebody presses Enter (or the input ends)."""
+    pressed = threading.Event()
+
+    def read() -> None:
+        sys.stdin.readline()
+        pressed.set()
+
+    console.say("Both cameras run; Enter starts the recording, Ctrl-C leaves.")
+    threading.Thread(target=read, name="enter", daemon=True).start()
+    return lambda: not pressed.is_set()
+
+
 class _Stop:
     """Whether somebody wants the recording to end."""
 
@@ -126,7 +142,7 @@ class _Watcher:
         if state.prompt is not None:
             self._tell("prompt", state.prompt.words)
         if state.coverage is not None:
-            self._tell("coverage", state.coverage.words)
+            self._tell("coverage", state.coverage.advice)
         frames = sum(camera.frames for camera in state.cameras.values())
         self._console.tick(frames, None, status_line(state))
 
@@ -139,10 +155,8 @@ class _Watcher:
 
 def status_line(state: CaptureState) -> str:
     """The whole state in one line."""
-    if not state.recording:
-        return "waiting for both cameras"
     minutes, seconds = divmod(int(state.elapsed_s), 60)
-    parts = [f"{minutes:02d}:{seconds:02d}"]
+    parts = [f"{minutes:02d}:{seconds:02d}" if state.recording else "not recording yet"]
     parts += [f"{side[0].upper()} {_camera_words(c)}" for side, c in state.cameras.items()]
     if math.isfinite(state.offset_s):
         parts.append(f"{abs(state.offset_s) * 1000:.1f} ms apart")

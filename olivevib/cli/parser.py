@@ -14,7 +14,7 @@ STAGE_VERBS = {
     "analyse": "displacement, velocity, acceleration, spectra -> vibration.h5",
     "compare": "optical against accelerometer -> comparison.h5",
 }
-EXPORTS = ("csv", "txt", "h5", "dxf", "step", "iges", "ply", "uff", "c3d", "trc", "mat")
+EXPORTS = ("csv", "txt", "h5", "dxf", "step", "iges", "ply", "uff", "c3d", "trc", "mat", "parquet")
 EXAMPLES = """\
 a trial from two videos and two recordings of the calibration board:
   olivevib new T04 --left left.mkv --right right.mkv --size 60 --ids 1-8 \\
@@ -221,15 +221,25 @@ def _set_option(parser: Any) -> None:
     )
 
 
+_REPORT = """\
+Several trials also give season.html and its table season.csv (a row a marker and phase), in DIR or
+in the current folder.
+"""
+
+
 def _result_verbs(verbs: Any) -> None:
     show = _add(verbs, "show", "results:show", "state and headline numbers of a trial")
     show.add_argument(
         "trial", nargs="?", metavar="TRIAL", help="without: all trials here, a line each"
     )
     show.add_argument("--json", action="store_true", help="everything, for programs")
-    report = _add(verbs, "report", "results:report", "one self-contained page a trial")
-    report.add_argument("trials", nargs="+", metavar="TRIAL")
+    report = _add(verbs, "report", "results:report", "one self-contained page a trial", _REPORT)
+    report.add_argument("trials", nargs="+", metavar="TRIAL", help="trials, or folders of trials")
     report.add_argument("-o", dest="output", metavar="DIR", help="where the pages go")
+    report.add_argument("--pdf", action="store_true", help="also as PDF (needs olivevib[pdf])")
+    report.add_argument("--figures", action="store_true", help="also each figure as an SVG file")
+    report.add_argument("--season", action="store_true", help="only the page over all trials")
+    report.add_argument("--parquet", action="store_true", help="the season's table also as Parquet")
     export = _add(verbs, "export", "results:export", "the 3-D paths for other programs")
     export.add_argument("trial", metavar="TRIAL")
     export.add_argument("--to", required=True, choices=EXPORTS, help="format")
@@ -264,6 +274,7 @@ _LAMP = """\
 Let an LED flash at a known frequency, such as 500 Hz (no multiple of half the frame rate), through
 paper right before the lens, with an exposure of less than half a flash. Record some seconds with
 olivevib capture. Stripes must travel over the picture.
+Without --led: a trial whose calibration board was waved in a video; the row times that it showed.
 """
 
 
@@ -315,9 +326,12 @@ def _other_verbs(verbs: Any) -> None:
     simulate.add_argument("--scenario", metavar="NAME", help="see --list")
     simulate.add_argument("--seed", type=int, default=1, metavar="N")
     simulate.add_argument("--list", action="store_true", help="name and describe the scenarios")
-    rowtime = _add(verbs, "rowtime", "row_time:row_time", "a camera's row time from a lamp", _LAMP)
-    rowtime.add_argument("file", metavar="FILE", help="a recording of the lamp")
-    rowtime.add_argument("--led", type=float, required=True, metavar="HZ", help="flashes a second")
+    help_ = "a camera's row time from a lamp, or from a waved board"
+    rowtime = _add(verbs, "rowtime", "row_time:row_time", help_, _LAMP)
+    rowtime.add_argument(
+        "file", metavar="FILE", help="a recording of the lamp; without --led: TRIAL"
+    )
+    rowtime.add_argument("--led", type=float, metavar="HZ", help="flashes a second")
     rowtime.add_argument("--camera", metavar="NAME", help="whose it is, where the file cannot say")
     _plan_verb(verbs)
     _study_verbs(verbs)

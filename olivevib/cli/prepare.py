@@ -1,4 +1,4 @@
-"""Verbs before the measurement: init, new."""
+"""Verbs before the measurement: init, new; and archive, after all of it."""
 
 from __future__ import annotations
 
@@ -50,6 +50,8 @@ def new(arguments: argparse.Namespace, console: Console) -> int:
     )
     folder = place_for_new(arguments.trial, Path())
     trial = pipeline.new_trial(folder, plan, console.tick)
+    changes = values.settings(arguments.set)
+    trial = trial.changed(changes) if changes else trial
     console.say(f"made {trial.folder}; describe it in {trial.folder / 'trial.toml'}")
     console.say(f"Next: olivevib run {arguments.trial}")
     return 0
@@ -71,4 +73,16 @@ def preset(arguments: argparse.Namespace, console: Console) -> int:
     path = pipeline.keep_preset(trial, arguments.name, arguments.sensor, Path())
     print(path)
     console.say(f"Next: olivevib new TRIAL … --accelerometer FILE --preset {arguments.name}")
+    return 0
+
+
+def archive(arguments: argparse.Namespace, console: Console) -> int:
+    """Leave trials out of lists, or take them back; nothing on the disk moves."""
+    from olivevib.trial import Trial
+    from olivevib.trial.workspace import find_trial
+
+    for name in arguments.trials:
+        trial = Trial.open(find_trial(name, Path()))
+        trial.changed({"session.archived": None if arguments.undo else True})
+        console.say(f"{trial.name} is {'listed again' if arguments.undo else 'archived'}.")
     return 0

@@ -10,6 +10,7 @@ from typing import Any
 
 from olivevib import values
 from olivevib.cli.console import Console
+from olivevib.errors import OlivevibError
 
 
 def show(arguments: argparse.Namespace, console: Console) -> int:
@@ -18,6 +19,8 @@ def show(arguments: argparse.Namespace, console: Console) -> int:
     from olivevib.trial.summary import summary
     from olivevib.trial.workspace import find_trial
 
+    if arguments.trial is None:
+        return _list(arguments.json)
     facts = summary(Trial.open(find_trial(arguments.trial, Path())))
     if arguments.json:
         _out(json.dumps(facts, indent=2, ensure_ascii=False, allow_nan=False))
@@ -28,15 +31,44 @@ def show(arguments: argparse.Namespace, console: Console) -> int:
     return 0
 
 
-def report(arguments: argparse.Namespace, console: Console) -> int:
-    """Write one page a trial; several trials also give a season page."""
-    from olivevib import pipeline
+def _list(as_json: bool) -> int:
+    """Every trial of the workspace here: its quality word, and why."""
     from olivevib.trial import Trial
-    from olivevib.trial.workspace import find_trial
+    from olivevib.trial.quality import quality_of, stage_lines
+    from olivevib.trial.workspace import list_trials
 
-    trials = [Trial.open(find_trial(name, Path())) for name in arguments.trials]
-    for page in pipeline.report(trials, arguments.output, console.tick):
-        _out(str(page))
+    rows: list[dict[str, Any]] = []
+    for folder in list_trials(Path()):
+        try:
+            trial = Trial.open(folder)
+            stages = stage_lines(trial)
+            quality = quality_of(stages, trial)
+        except OlivevibError as error:
+            rows.append({"trial": folder.name, "quality": "unreadable", "why": error.what})
+            continue
+        if not trial.settings.session.archived:
+            states = {stage.name: stage.state for stage in stages}
+            row = {"trial": trial.name, "quality": quality.word, "why": quality.why}
+            rows.append(row | {"stages": states})
+    if as_json:
+        _out(json.dumps(rows, indent=2, ensure_ascii=False))
+    for row in () if as_json else rows:
+        _out(f"{row['trial']}  {row['quality']}: {row['why']}")
+    return 0
+
+
+def report(arguments: argparse.Namespace, console: Console) -> int:
+    """Write one page a trial; several trials also give a season page and its table."""
+    from olivevib import pipeline
+    from olivevib.batch import find_trials
+    from olivevib.report import Also
+    from olivevib.trial import Trial
+
+    also = Also(pdf=arguments.pdf, figures=arguments.figures, parquet=arguments.parquet)
+    trials = [Trial.open(folder) for folder in find_trials(arguments.trials, Path())]
+    pages = not arguments.season
+    for path in pipeline.report(trials, arguments.output, console.tick, also, pages):
+        _out(str(path))
     return 0
 
 

@@ -23,13 +23,16 @@ class Section(BaseModel):
 
 
 class Session(Section):
-    """Who, where, when. ``simulated`` marks a trial that no camera recorded."""
+    """Who, where, when. ``simulated`` marks a trial that no camera recorded, ``archived``
+    one that lists leave out.
+    """
 
     date: datetime.date | datetime.datetime | str | None = None
     place: str = ""
     operator: str = ""
     notes: str = ""
     simulated: bool = False
+    archived: bool = False
 
 
 class Tree(Section):
@@ -99,6 +102,7 @@ class Camera(Section):
     stamps: str | None = None
     row_time_us: float | None = None
     row_time_sigma_us: float | None = Field(default=None, ge=0)
+    row_time_source: Literal["declared", "led", "board"] = "declared"
     exposure_ms: float | None = Positive
 
 
@@ -118,7 +122,8 @@ class Cameras(Section):
         if camera.row_time_us is None:
             return 0.0, nan, "unknown"
         sigma = camera.row_time_sigma_us
-        return camera.row_time_us * 1e-6, nan if sigma is None else sigma * 1e-6, "declared"
+        known = nan if sigma is None else sigma * 1e-6
+        return camera.row_time_us * 1e-6, known, camera.row_time_source
 
 
 class CalibrationInputs(Section):

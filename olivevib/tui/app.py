@@ -134,16 +134,20 @@ class OlivevibApp(App[None]):
     def _write_kept(self, kept: Kept) -> None:
         write_kept(self.workspace, kept)
 
-    def start(self, job: Work) -> None:
-        """Do long work in a thread; one at a time."""
+    def is_free(self) -> bool:
+        """Whether work can start now; says so where it cannot."""
         if self.progress is not None:
             what, remedy = f"{self.progress.title} is running.", "Wait for it, or cancel with Esc."
             self.show_error(UsageError(what, "One work runs at a time.", remedy))
-            return
-        self._cancel.clear()
-        self.cancelling = False
-        self.progress = Progress(job.title, "starting", 0, None)
-        self._perform(job)
+        return self.progress is None
+
+    def start(self, job: Work) -> None:
+        """Do long work in a thread; one at a time."""
+        if self.is_free():
+            self._cancel.clear()
+            self.cancelling = False
+            self.progress = Progress(job.title, "starting", 0, None)
+            self._perform(job)
 
     @work(thread=True, exclusive=True, group="work")
     def _perform(self, job: Work) -> None:

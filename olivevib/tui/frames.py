@@ -14,6 +14,7 @@ from olivevib.arrays import Floats, Grey
 from olivevib.signals import State
 
 if TYPE_CHECKING:
+    from olivevib.detection import DetectionSettings
     from olivevib.files.video import Frame, Video
     from olivevib.tracking import Track
     from olivevib.trial.records.tracks import StoredTracks
@@ -70,17 +71,17 @@ class FrameReader:
         seen = markers_at(self._tracks.of(side), row) if self._tracks else ()
         return Shot(side, reached, self._count(side), grey, seen, stamp_s)
 
-    def initialised(self, side: str, index: int) -> Shot:
+    def initialised(self, side: str, index: int, settings: DetectionSettings | None) -> Shot:
         """The same picture, with the markers that the detector finds in it alone, now.
 
-        The paper's INITIALIZE with the parameters of trial.toml as they are at this moment.
+        The paper's INITIALIZE with ``settings``, or the parameters of trial.toml where None.
         """
         from olivevib.detection import Detector
         from olivevib.pipeline.libraries import trial_library
         from olivevib.trial import Trial
 
         shot, trial = self.shot(side, index), Trial.open(self._folder)
-        detector = Detector(trial_library(trial), trial.settings.detection)
+        detector = Detector(trial_library(trial), settings or trial.settings.detection)
         found = detector.detect(shot.grey) if shot.grey is not None else []
         nothing = np.empty((0, 2))
         markers = tuple(Seen(d.id, d.corners_px, nothing, "seen", np.nan) for d in found)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ from olivevib.tui.harmless import harmless
 from olivevib.tui.work import Result, Work
 
 if TYPE_CHECKING:
+    from olivevib.calibration.guidance import Guidance
     from olivevib.pipeline import NewTrial
 
 
@@ -50,6 +51,20 @@ def _ran(done: Sequence[str], cautions: Sequence[Caution]) -> str:
     return f"{', '.join(done)} done{warned}. v shows the results, e makes the report."
 
 
+def preview_board(folder: Path, show: Callable[[Guidance], None]) -> Work:
+    """Go through the board recordings as a running camera would; nothing is written."""
+
+    def do(tick: Tick) -> Result:
+        from olivevib.pipeline.preview import preview
+        from olivevib.trial import Trial
+
+        last = preview(Trial.open(folder), lambda told, _: show(told), tick)
+        show(last)
+        return Result(f"{last.pairs} common views; {last.advice}.")
+
+    return Work(f"{_name(folder)}: board", do)
+
+
 def make_report(folder: Path) -> Work:
     """One self-contained page beside the trial."""
 
@@ -79,8 +94,8 @@ def make_export(folder: Path, to: str) -> Work:
     return Work(f"{_name(folder)}: export {to}", do)
 
 
-def make_trial(workspace: Path, name: str, plan: NewTrial) -> Work:
-    """A new trial from recordings; nothing is overwritten."""
+def make_trial(workspace: Path, name: str, plan: NewTrial, record: Mapping[str, object]) -> Work:
+    """A new trial from recordings, with its session record; nothing is overwritten."""
 
     def do(tick: Tick) -> Result:
         from olivevib import pipeline
@@ -88,6 +103,7 @@ def make_trial(workspace: Path, name: str, plan: NewTrial) -> Work:
 
         make_workspace(workspace)
         trial = pipeline.new_trial(place_for_new(name, workspace), plan, tick)
+        trial = trial.changed(record) if record else trial
         words = f"{harmless(trial.name)} is made. r runs every stage, s describes it."
         return Result(words, opens=trial.folder)
 

@@ -5,9 +5,9 @@ Everything heavy is imported inside: the first picture of the app waits for none
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -15,31 +15,20 @@ from olivevib.errors import InputError, OlivevibError
 
 if TYPE_CHECKING:
     from olivevib.comparison import Comparison
+    from olivevib.detection import DetectionSettings
+    from olivevib.geometry import StereoRig
     from olivevib.reconstruction import Trajectory
     from olivevib.trial import Trial
+    from olivevib.trial.quality import StageLine
     from olivevib.tui.views.coverage import Coverage
+    from olivevib.tui.views.rig import RigScene
     from olivevib.tui.views.setting_rows import SettingRow
+    from olivevib.tui.views.spectrogram import ShadePlot
     from olivevib.vibration import Vibration
 
 Value = TypeVar("Value")
+LAST = 30  # trials whose values a form offers again
 STAGE_NAMES = ("calibrate", "track", "reconstruct", "analyse", "compare")
-
-
-@dataclass(frozen=True)
-class StageLine:
-    """One stage of a trial: its state and the reason, as words."""
-
-    name: str
-    state: str
-    reason: str
-
-
-@dataclass(frozen=True)
-class Quality:
-    """One word for how far a trial can be used as it is, and why."""
-
-    word: str
-    why: str
 
 
 @dataclass(frozen=True)
@@ -49,9 +38,12 @@ class TrialRow:
     folder: Path
     name: str
     stages: tuple[StageLine, ...] = ()
-    quality: Quality = Quality("…", "reading it")
+    word: str = "…"
+    why: str = "reading it"
     about: str = ""
     simulated: bool = False
+    archived: bool = False
+    notes: str = ""
 
 
 @dataclass(frozen=True)
@@ -68,6 +60,7 @@ class TrialFacts:
     summary: Mapping[str, Any] | None = None
     fault: OlivevibError | None = None
     resume: str = ""
+    notes: str = ""
 
 
 @dataclass(frozen=True)
@@ -83,6 +76,22 @@ class Results:
 
 
 @dataclass(frozen=True)
+class FormValues:
+    """What the form of a new trial starts with: values to take over, and what to offer."""
+
+    shared: Mapping[str, str]
+    used: Mapping[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class CameraLine:
+    """One camera at this computer: what it is called, its modes in words."""
+
+    title: str
+    modes: str
+
+
+@dataclass(frozen=True)
 class CalibrationFacts:
     """What the calibration page shows; no coverage before the stage has run."""
 
@@ -90,6 +99,7 @@ class CalibrationFacts:
     coverage: tuple[Coverage, ...] = ()
     places: tuple[str, ...] = ()
     cautions: tuple[Mapping[str, str], ...] = ()
+    scene: RigScene | None = None
 
 
 def guarded(read: Callable[[], Value]) -> Value | OlivevibError:
@@ -114,56 +124,36 @@ def trial_row(folder: Path) -> TrialRow:
     """The line of one trial in the list; a trial that cannot be read says so in its line."""
     found = guarded(lambda: _row(folder))
     if isinstance(found, OlivevibError):
-        return TrialRow(folder, folder.name, (), Quality("unreadable", str(found)))
+        return TrialRow(folder, folder.name, (), "unreadable", str(found))
     return found
 
 
 def _row(folder: Path) -> TrialRow:
     from olivevib.trial import Trial
+    from olivevib.trial.quality import quality_of, stage_lines
 
     trial = Trial.open(folder)
     session, tree = trial.settings.session, trial.settings.tree
     about = [str(part) for part in (session.date, session.place, tree.cultivar) if part]
     stages = stage_lines(trial)
     quality = quality_of(stages, trial)
-    return TrialRow(folder, trial.name, stages, quality, ", ".join(about), session.simulated)
-
-
-def stage_lines(trial: Trial) -> tuple[StageLine, ...]:
-    """The stages in order; files of the trial are named from its folder on."""
-    here = f"{trial.folder.resolve()}{os.sep}"
-    near = f"{trial.folder}{os.sep}"
-    return tuple(
-        StageLine(name, state.state.value, state.reason.replace(here, "").replace(near, ""))
-        for name, state in trial.states().items()
+    return TrialRow(
+        folder,
+        trial.name,
+        stages,
+        quality.word,
+        quality.why,
+        ", ".join(about),
+        session.simulated,
+        session.archived,
+        session.notes,
     )
-
-
-def quality_of(stages: tuple[StageLine, ...], trial: Trial) -> Quality:
-    """The worst thing that can be said of a trial, in one word."""
-    for word in ("failed", "stale", "missing", "blocked"):
-        bad = next((s for s in stages if s.state == word), None)
-        if bad is not None:
-            said = {"missing": "unfinished", "blocked": "unfinished"}.get(word, word)
-            return Quality(said, f"{bad.name}: {bad.reason}")
-    if not trial.vibration:
-        return Quality("unfinished", "there is nothing to analyse yet")
-    return _quality_of_results(trial)
-
-
-def _quality_of_results(trial: Trial) -> Quality:
-    for comparison in trial.comparison:
-        if comparison.verdict.value == "differs":
-            return Quality("differs", comparison.reason)
-    cautions = trial.cautions
-    if cautions:
-        return Quality("warnings", f"{len(cautions)}: {', '.join(c.code for c in cautions)}")
-    return Quality("clean", "every stage is done and none of them warned")
 
 
 def trial_facts(folder: Path) -> TrialFacts:
     """What the trial screen shows; raises InputError where the trial cannot be read."""
     from olivevib.trial import Trial
+    from olivevib.trial.quality import stage_lines
     from olivevib.trial.summary import summary
 
     trial = Trial.open(folder)
@@ -179,6 +169,7 @@ def trial_facts(folder: Path) -> TrialFacts:
         None if isinstance(found, OlivevibError) else found,
         found if isinstance(found, OlivevibError) else None,
         resume,
+        trial.settings.session.notes,
     )
 
 
@@ -211,16 +202,84 @@ def calibration_facts(folder: Path) -> CalibrationFacts:
         tuple(map(Coverage, ("left", "right"), points, sizes)),
         camera_places(rig.R_right_left, rig.t_right_left_mm),
         tuple(vars(c) for c in record.cautions),
+        _scene(trial, rig),
     )
 
 
-def form_values(folder: Path) -> dict[str, str]:
-    """What a new trial may take over from another one: markers, board, cameras, band."""
+def _scene(trial: Trial, rig: StereoRig) -> RigScene:
+    """Both cameras in the left one's frame, and the mean place of each marker."""
+    import numpy as np
+
+    from olivevib.tui.views.coverage import camera_places
+    from olivevib.tui.views.rig import RigScene, Stand
+
+    R, t = rig.R_right_left, rig.t_right_left_mm
+    stands = []
+    for name, camera, axes, centre in (
+        ("left", rig.left, np.eye(3), np.zeros(3)),
+        ("right", rig.right, R, -R.T @ t),
+    ):
+        width, height = camera.size_px
+        half = (np.arctan(width / 2 / camera.K[0, 0]), np.arctan(height / 2 / camera.K[1, 1]))
+        stands.append(Stand(name, centre, axes, float(half[0]), float(half[1])))
+    path, points = trial.trajectory, np.empty((0, 3))
+    if path is not None:
+        seen = np.asarray(np.isfinite(path.xyz_mm).all(axis=2))
+        count = np.maximum(1, seen.sum(axis=0))[:, None]
+        means = np.where(seen[:, :, None], path.xyz_mm, 0.0).sum(axis=0) / count
+        points = means[np.asarray(seen.any(axis=0))]
+    told = "; dots: markers" if len(points) else ""
+    return RigScene(tuple(stands), points, f"{camera_places(R, t)[0]}{told}")
+
+
+def camera_lines() -> tuple[CameraLine, ...]:
+    """The cameras at this computer, in the order of their numbers."""
+    from olivevib.files.capture import list_cameras
+    from olivevib.pipeline.capture.devices import mode_words
+
+    return tuple(CameraLine(c.title, mode_words(c.modes)) for c in list_cameras())
+
+
+def shades(found: Results, marker: int, name: str) -> ShadePlot | None:
+    """The spectrogram of one marker, the same as in the report; None for too short a record."""
+    from olivevib.report.figures.spectrogram import spectrogram
+    from olivevib.tui.views.of_results import bands_of
+    from olivevib.tui.views.spectrogram import ShadePlot
+
+    rate = found.summary["timing"]["left"]["frame_rate_hz"]
+    path = found.trajectory
+    if path is None or not rate or marker not in path.ids:
+        return None
+    one = spectrogram(path, marker, rate / 2)
+    if one is None:
+        return None
+    title = f"marker {name} · displacement, as sampled"
+    return ShadePlot(title, one.t_s, one.f_hz, one.power, bands_of(found.vibration))
+
+
+def form_values(workspace: Path, like: Path | None) -> FormValues:
+    """What a new trial may take over from ``like``, and what trials here have said before."""
     from olivevib.trial import Trial
     from olivevib.tui.plan import values_of
 
-    trial = Trial.open(folder)
-    return values_of(trial.settings, trial.path)
+    used: dict[str, dict[str, None]] = {}
+    for folder in trial_folders(workspace)[-LAST:]:
+        trial = guarded(partial(Trial.open, folder))
+        if isinstance(trial, Trial):
+            for name, text in values_of(trial.settings, trial.path).items():
+                used.setdefault(name, {})[text] = None
+    shared = {}
+    if like is not None:
+        trial = Trial.open(like)
+        shared = values_of(trial.settings, trial.path)
+    return FormValues(shared, {name: tuple(texts) for name, texts in used.items()})
+
+
+def settings_now(folder: Path) -> DetectionSettings:
+    """The parameters of detection as trial.toml has them; raises InputError."""
+    from olivevib.trial import Trial
+
+    return Trial.open(folder).settings.detection
 
 
 def setting_values(folder: Path) -> tuple[SettingRow, ...]:

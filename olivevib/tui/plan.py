@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,13 +16,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Field:
-    """One line of the form; ``path``: it names a file or folder that can be picked."""
+    """One line of the form; ``path``: it names a file or folder that can be picked.
+
+    choices: what is offered beside what trials of this workspace said before.
+    """
 
     name: str
     label: str
     hint: str
     path: bool = False
+    choices: tuple[str, ...] = ()
 
+
+BOARDS = (
+    "coded:5x5,pitch=60,size=44",
+    "charuco:7x5,square=50,marker=35,dict=DICT_5X5_50",
+    "charuco:4x5,square=54,marker=40.5,dict=DICT_4X4_1000",
+    "arucogrid:5x7,size=40,gap=10,dict=DICT_6X6_250",
+    "chessboard:9x6,square=25",
+)
+LIBRARIES = ("olive49", "aruco:DICT_4X4_50", "apriltag:36h11")
+SIZES = ("40", "50", "60", "80", "100")
+IDS = ("1-6", "1-8", "1-12", "1-24")
+BANDS = ("5-14", "5-25", "5-45", "15-40")
 
 FIELDS = (
     Field("trial", "trial", "its name, e.g. 2026-11-20_T04"),
@@ -30,20 +46,36 @@ FIELDS = (
     Field("right", "right recording", "video of the right camera", True),
     Field("calibration_left", "left board", "video or folder of stills", True),
     Field("calibration_right", "right board", "video or folder of stills", True),
-    Field("board", "board", "coded:5x5,pitch=60,size=44 · charuco:4x5,square=54,marker=40.5,…"),
+    Field("board", "board", "coded:5x5,pitch=60,size=44 · charuco:4x5,square=54,…", choices=BOARDS),
     Field("rig", "or a rig", "rig.toml of an earlier calibration, instead of a board", True),
-    Field("size", "marker size, mm", "outer side of the dark square"),
-    Field("ids", "marker ids", "1,2,5-9; empty: every id of the library"),
-    Field("markers", "marker library", "olive49, aruco:DICT_4X4_50, apriltag:36h11, a TOML file"),
-    Field("shutter", "shutter", "rolling or global; empty: unknown"),
+    Field("size", "marker size, mm", "outer side of the dark square", choices=SIZES),
+    Field("ids", "marker ids", "1,2,5-9; empty: every id of the library", choices=IDS),
+    Field("markers", "marker library", "olive49, aruco:…, a TOML file", choices=LIBRARIES),
+    Field("shutter", "shutter", "rolling or global; empty: unknown", choices=("rolling", "global")),
     Field("row_time", "row time, µs", "27.8 or 27.8,-27.8; empty: unknown"),
-    Field("band", "band, Hz", "where the shaker's frequency may lie: 5-45"),
+    Field("band", "band, Hz", "where the shaker's frequency may lie: 5-45", choices=BANDS),
     Field("accelerometer", "accelerometer", "what the logger wrote", True),
     Field("accelerometer_marker", "its marker", "the id it was fixed to"),
     Field("left_stamps", "left stamps", "time stamps, where they are in a file", True),
     Field("right_stamps", "right stamps", "time stamps, where they are in a file", True),
-    Field("link", "link", "yes: leave the recordings where they are; empty: copy them"),
+    Field("link", "link", "yes: leave the recordings in place; empty: copy", choices=("yes",)),
+    Field("date", "date", "when it was recorded, 2026-11-20"),
+    Field("place", "place", "grove, plot, row"),
+    Field("operator", "operator", "who recorded it"),
+    Field("tree", "tree", "its number or name"),
+    Field("cultivar", "cultivar", "Coratina, Leccino, …"),
+    Field("machine", "machine", "make and type of the shaker"),
+    Field("notes", "notes", "anything worth knowing later"),
 )
+RECORD = {
+    "date": "session.date",
+    "place": "session.place",
+    "operator": "session.operator",
+    "tree": "tree.id",
+    "cultivar": "tree.cultivar",
+    "machine": "machine.make",
+    "notes": "session.notes",
+}
 PATHS = tuple(field.name for field in FIELDS if field.path)
 
 
@@ -65,7 +97,7 @@ def plan_of(values: Mapping[str, str]) -> NewTrial:
         board=said.get("board"),
         rig=said.get("rig"),
         markers=said.get("markers", "olive49"),
-        size_mm=_number(said, "size"),
+        size_mm=number_in(said, "size"),
         ids=typed.id_list(said.get("ids")),
         shutter=_shutter(said),
         row_time_us=(left_row, right_row),
@@ -76,6 +108,18 @@ def plan_of(values: Mapping[str, str]) -> NewTrial:
         accelerometer_marker=_whole(said, "accelerometer_marker"),
         link=said.get("link", "no").lower() in ("yes", "y", "true", "1"),
     )
+
+
+def record_of(values: Mapping[str, str]) -> dict[str, object]:
+    """The session record as dotted settings; only what was said."""
+    said = {name: values.get(name, "").strip() for name in RECORD}
+    return {RECORD[name]: text for name, text in said.items() if text}
+
+
+def free_name(taken: Iterable[str]) -> str:
+    """A name that no trial has yet, such as T01."""
+    known = set(taken)
+    return next(name for k in range(1, 10_000) if (name := f"T{k:02d}") not in known)
 
 
 def values_of(settings: TrialSettings, place: Callable[[str], Path]) -> dict[str, str]:
@@ -111,7 +155,8 @@ def trial_name(values: Mapping[str, str]) -> str:
     return name
 
 
-def _number(said: Mapping[str, str], name: str) -> float | None:
+def number_in(said: Mapping[str, str], name: str) -> float | None:
+    """The number in a field; None where it is empty, UsageError where it is none."""
     if name not in said:
         return None
     try:
@@ -121,7 +166,7 @@ def _number(said: Mapping[str, str], name: str) -> float | None:
 
 
 def _whole(said: Mapping[str, str], name: str) -> int | None:
-    number = _number(said, name)
+    number = number_in(said, name)
     if number is not None and number != int(number):
         raise UsageError(f"{said[name]!r} is no id.", "", "Write the marker's number, e.g. 3.")
     return None if number is None else int(number)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from olivevib.files.capture.recording import Recording
 
 JOIN_S = 2.0
 RETRY_S = 0.5
+RECENT = 30
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,7 @@ class CameraRunner:
         self.controls = Controls()
         self.parts: list[Path] = []
         self.stamps_s: list[float] = []  # of the recorded frames, after the origin; only appended
+        self.recent_ns: deque[int] = deque(maxlen=RECENT)  # of the last pictures, recorded or not
         self.gone_ns = 0  # when it last went away and its file was closed
         self._camera = camera
         self._reopen = reopen
@@ -164,6 +167,7 @@ class CameraRunner:
                 recording.append(shot, placed, self.controls)
                 if recording.frames > before:
                     self.stamps_s.append((placed - self._origin_ns) * 1e-9)
+        self.recent_ns.append(placed)
         self._latest = (shot, placed)
 
     def _begin_part(self) -> Recording:

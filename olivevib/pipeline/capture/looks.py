@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -27,10 +27,10 @@ PIXEL_PX = 0.45  # blur by the pixel's area and by interpolation between pixels
 class Look:
     """One decoded frame, at ``t_s`` after the start.
 
-    ids and centres_px (N, 2) of the markers seen; blur_px: sigma of their borders; white_dn,
-    dark_dn: brightness of paper and print; saturated: share of pixels at the upper end, in the
-    markers where there are any, else in the picture; board: what was seen of the board. NaN where
-    nothing could be measured.
+    ids, centres_px (N, 2) and corners_px (N, 4, 2) of the markers seen; blur_px: sigma of their
+    borders; white_dn, dark_dn: brightness of paper and print; saturated: share of pixels at the
+    upper end, in the markers where there are any, else in the picture; board: what was seen of the
+    board. NaN where nothing could be measured.
     """
 
     t_s: float
@@ -41,6 +41,7 @@ class Look:
     dark_dn: float
     saturated: float
     board: BoardView | None = None
+    corners_px: Floats = field(default_factory=lambda: np.empty((0, 4, 2)))
 
 
 def grey_of_shot(shot: Shot, facts: CameraFacts) -> Grey | None:
@@ -81,6 +82,7 @@ def look_at(
         dark_dn=float(dark),
         saturated=float(saturated),
         board=board,
+        corners_px=np.array([d.corners_px for d in found], dtype=np.float64).reshape(-1, 4, 2),
     )
 
 

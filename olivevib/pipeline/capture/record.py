@@ -19,7 +19,14 @@ from olivevib.files.atomic import write_text_atomic
 from olivevib.files.capture import Camera, CameraRunner, open_camera
 from olivevib.marker import load_library
 from olivevib.pipeline.capture.looker import Looker
-from olivevib.pipeline.capture.plan import Captured, CapturePlan, Watch, unwatched
+from olivevib.pipeline.capture.plan import (
+    Captured,
+    CapturePlan,
+    Hold,
+    Watch,
+    at_once,
+    unwatched,
+)
 from olivevib.pipeline.capture.rehearsal import PREFIX, simulated_cameras
 from olivevib.pipeline.capture.session import SIDES, Session, nearly_full
 from olivevib.pipeline.capture.verdict import Verdict
@@ -31,11 +38,16 @@ LIVE = ("v4l2", "dshow", "avfoundation", "http", "pipe")  # kinds that may come 
 
 
 def capture(
-    folder: Path, plan: CapturePlan, watch: Watch = unwatched, tick: Tick = silent
+    folder: Path,
+    plan: CapturePlan,
+    watch: Watch = unwatched,
+    tick: Tick = silent,
+    hold: Hold = at_once,
 ) -> Captured:
     """Record both cameras into ``folder`` as left.nut and right.nut, each with its side-car.
 
-    ``watch`` gets the state ten times a second and stops the recording by raising Cancelled. What
+    ``watch`` gets the state ten times a second and stops the recording by raising Cancelled; while
+    ``hold`` is true the cameras run and are watched, and nothing is recorded yet. What
     was recorded is kept whatever happens; a fault that ended it early is in the result. Raises
     UsageError or InputError before anything is recorded: a name that means no camera, a camera that
     delivers nothing, recordings that are there already, no room on the disk.
@@ -51,18 +63,26 @@ def capture(
     session = Session(plan, cameras, looker if plan.preview else None, reopen)
     videos: dict[str, Path] = {}
     try:
-        session.start(watch)
+        session.start(watch, hold)
         videos = session.record(folder)
         _write_record(folder, plan, cameras, None)
         session.watch_until_done(watch)
     finally:
         session.finish()
+        if not videos:
+            _leave(folder)
     session.join(tick)
     verdict = session.judge()
     with suppress(InputError):  # no room: what was written at the start stays
         _write_record(folder, plan, cameras, verdict)
     there = {side: video for side, video in videos.items() if video.is_file()}
     return Captured(folder, there, verdict, session.error)
+
+
+def _leave(folder: Path) -> None:
+    """Take away the folder that was made for nothing; one with anything in it stays."""
+    with suppress(OSError):
+        folder.rmdir()
 
 
 def _check(folder: Path, plan: CapturePlan) -> None:

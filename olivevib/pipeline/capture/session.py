@@ -7,7 +7,7 @@ import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -17,7 +17,14 @@ from olivevib.errors import InputError, OlivevibError
 from olivevib.files.capture import Beat, Camera, CameraRunner, DiskFull, RunnerState, join_parts
 from olivevib.pipeline.capture.looker import Looker
 from olivevib.pipeline.capture.looks import advise
-from olivevib.pipeline.capture.plan import CameraState, CapturePlan, CaptureState, Watch
+from olivevib.pipeline.capture.plan import (
+    CameraState,
+    CapturePlan,
+    CaptureState,
+    Hold,
+    Watch,
+    at_once,
+)
 from olivevib.pipeline.capture.prompts import Prompter
 from olivevib.pipeline.capture.verdict import CameraResult, Verdict, judge, judge_board
 from olivevib.progress import Cancelled, Tick, silent
@@ -63,8 +70,8 @@ class Session:
         self._stop = threading.Event()
         self._disk = threading.Thread(target=self._sync, name="disk", daemon=True)
 
-    def start(self, watch: Watch) -> None:
-        """Take pictures without recording until both cameras deliver steadily.
+    def start(self, watch: Watch, hold: Hold = at_once) -> None:
+        """Take pictures without recording until both cameras deliver steadily and ``hold`` ends.
 
         What a camera had in store is let go by then. InputError where one delivers none.
         """
@@ -78,7 +85,8 @@ class Session:
             states = {side: runner.state() for side, runner in self.runners.items()}
             self._raise_failures()
             waited = time.monotonic() - began
-            if all(s.latest for s in states.values()) and waited >= self.plan.warm_up_s:
+            warm = all(s.latest for s in states.values()) and waited >= self.plan.warm_up_s
+            if warm and not hold():
                 return
             late = [s for s in SIDES if states[s].latest is None]
             ended = [s for s in late if states[s].ended]
@@ -234,7 +242,7 @@ class Session:
             facts=runner.facts,
             frames=state.frames,
             dropped=beat.dropped,
-            fps=beat.fps,
+            fps=beat.fps if self._origin_ns else 1 / _period_s(runner.recent_ns),
             size_bytes=state.size_bytes,
             gone=state.gone,
             ended=state.ended,
@@ -255,12 +263,12 @@ class Session:
         return free, room / rate / 60 if rate > 0 else math.nan
 
     def _offset_s(self) -> float:
-        """Right minus left of the last second, modulo a frame."""
-        stamps = [np.array(self.runners[s].stamps_s[-30:], dtype=np.float64) for s in SIDES]
-        period = self._beats["left"].period_s
-        if min(s.size for s in stamps) < 5 or not math.isfinite(period):
+        """Right minus left of the last pictures, modulo a frame."""
+        left, right = (np.array(tuple(self.runners[s].recent_ns), dtype=np.int64) for s in SIDES)
+        period = _period_s(left)
+        if min(left.size, right.size) < 5 or not math.isfinite(period):
             return math.nan
-        turns = (stamps[1] - stamps[0][-1]) / period
+        turns = (right - left[-1]) * 1e-9 / period
         middle = np.angle(np.mean(np.exp(2j * np.pi * turns)))
         return float(middle / (2 * np.pi) * period)
 
@@ -275,6 +283,12 @@ class Session:
         while not self._stop.wait(SYNC_S):
             for runner in self.runners.values():
                 runner.sync()
+
+
+def _period_s(stamps_ns: Iterable[int]) -> float:
+    """The middle time between pictures, s; NaN for too few."""
+    stamps = np.array(tuple(stamps_ns), dtype=np.int64)
+    return float(np.median(np.diff(stamps))) * 1e-9 if stamps.size > 4 else math.nan
 
 
 def _free_bytes(folder: Path) -> int:

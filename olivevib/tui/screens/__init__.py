@@ -13,6 +13,7 @@ PAGES = {
     "trial": "trial:TrialPage",
     "results": "results:ResultsPage",
     "motion": "motion:MotionPage",
+    "spectrogram": "spectrogram:SpectrogramPage",
     "calibration": "calibration:CalibrationPage",
     "compare": "compare:ComparePage",
     "pictures": "pictures:PicturesPage",

@@ -3,52 +3,77 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
+from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, VerticalScroll
+from textual.message import Message
 from textual.widgets import Static
 
 from olivevib.tui import jobs
 from olivevib.tui.loader import CalibrationFacts, calibration_facts
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.views.coverage import calibration_text, coverage_plot
+from olivevib.tui.views.live import coverage_text
+from olivevib.tui.views.rig import rig_plot
 from olivevib.tui.widgets.plot import Plot
 
+if TYPE_CHECKING:
+    from olivevib.calibration.guidance import Guidance
+
 SIDES = ("left", "right")
+PANES = ("left-board", "right-board", "rig")
 
 
 class CalibrationPage(Page):
-    """Both cameras' coverage, and the verdict below."""
+    """Both cameras' coverage, where the cameras stand, and the verdict below."""
 
     NAME = "calibration"
     HELP_TEXT = Help(
         "Every dot is a point of the calibration board as a camera saw it; red ones lie more than "
         "three times the rms away from where the model puts them. Where no dot is, the lens is "
         "only extrapolated. The verdict is of views that the fit never saw: distances on the "
-        "board, in mm and per cent.",
+        "board, in mm and per cent. p goes through the board recordings and tells which tilts and "
+        "distances are still missing; to record them live, Esc, Esc, c and name the board.",
         "Fit rms 0.1–0.3 px; distances on unused views within 0.5 mm or 0.3 %; dots in every "
         "corner of both pictures, the board tilted by 20–45°, near and far.",
     )
-    JUMPS = (Jump("l", "#left-board"), Jump("r", "#right-board"), Jump("v", "#verdict"))
+    JUMPS = (
+        Jump("l", "#left-board"),
+        Jump("r", "#right-board"),
+        Jump("c", "#rig"),
+        Jump("v", "#verdict"),
+    )
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("t", "again", "Calibrate again"),
-        Binding("o", "camera", "Other camera"),
+        Binding("p", "preview", "Go through the board"),
+        Binding("o", "camera", "Next picture"),
     ]
     _found: CalibrationFacts | None = None
+    _shown = 0
+
+    class Covered(Message):
+        """The board recordings have been gone through further."""
+
+        def __init__(self, guidance: Guidance) -> None:
+            super().__init__()
+            self.guidance = guidance
 
     def body(self) -> ComposeResult:
         """Two pictures above, words below."""
         with Horizontal(id="boards"):
             for side in SIDES:
                 yield Plot(id=f"{side}-board", title=f"{side} camera")
+            yield Plot(id="rig", title="in space")
         with VerticalScroll(id="verdict", classes="pane"):
             yield Static("reading …", id="verdict-text", markup=False)
 
     def on_mount(self) -> None:
         """Left camera first."""
         self.query_one("#verdict").border_title = "Verdict"
+        self.query_one("#left-board").add_class("-shown")
         self.query_one("#left-board").focus()
 
     def read(self) -> CalibrationFacts:
@@ -63,6 +88,8 @@ class CalibrationPage(Page):
         for coverage in value.coverage:
             plot = self.query_one(f"#{coverage.side}-board", Plot)
             plot.show(partial(coverage_plot, coverage))
+        if value.scene is not None:
+            self.query_one("#rig", Plot).show(partial(rig_plot, value.scene))
         self.query_one("#verdict-text", Static).update(
             calibration_text(value.summary, value.places, value.cautions, self.olive.palette)
             if value.coverage
@@ -77,8 +104,22 @@ class CalibrationPage(Page):
         """Run the stage."""
         self.olive.start(jobs.run_one(self.folder, "calibrate"))
 
+    def action_preview(self) -> None:
+        """Go through the board recordings: what they cover, what is still missing."""
+        self.olive.start(jobs.preview_board(self.folder, self._take))
+
+    def _take(self, guidance: Guidance) -> None:
+        self.post_message(self.Covered(guidance))
+
+    @on(Covered)
+    def _covered(self, message: Covered) -> None:
+        text = coverage_text(message.guidance, self.olive.palette)
+        self.query_one("#verdict-text", Static).update(text)
+        self.query_one("#verdict").border_title = "Coverage of the board recordings"
+
     def action_camera(self) -> None:
-        """In a small terminal: the other picture."""
-        self.toggle_class("-zoomed")
-        side = SIDES[self.has_class("-zoomed")]
-        self.query_one(f"#{side}-board").focus()
+        """In a small terminal: the next of the three pictures."""
+        self._shown = (self._shown + 1) % len(PANES)
+        for pane in PANES:
+            self.query_one(f"#{pane}").set_class(pane == PANES[self._shown], "-shown")
+        self.query_one(f"#{PANES[self._shown]}").focus()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import ClassVar
@@ -11,7 +12,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, VerticalScroll
 from textual.message import Message
-from textual.widgets import Button, Input, Label
+from textual.widgets import Button, Input
 from textual.worker import get_current_worker
 
 from olivevib.arrays import Grey
@@ -19,11 +20,21 @@ from olivevib.errors import OlivevibError
 from olivevib.tui import jobs
 from olivevib.tui.frames import first_frame
 from olivevib.tui.harmless import harmless
-from olivevib.tui.loader import form_values, guarded
-from olivevib.tui.plan import FIELDS, PATHS, guesses, plan_of, trial_name
+from olivevib.tui.loader import FormValues, form_values, guarded
+from olivevib.tui.plan import (
+    FIELDS,
+    PATHS,
+    free_name,
+    guesses,
+    plan_of,
+    record_of,
+    trial_name,
+)
+from olivevib.tui.screens.choose import ChooseScreen
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.screens.pick import PickScreen
 from olivevib.tui.views.picture import Window
+from olivevib.tui.widgets.form import form_rows, form_values_of
 from olivevib.tui.widgets.picture import Picture
 
 SHOWN = ("left", "right")
@@ -36,13 +47,14 @@ class NewTrialPage(Page):
     HELP_TEXT = Help(
         "Two recordings, and either two recordings of the calibration board with its description "
         "or the rig of an earlier calibration. Naming the left side fills in what lies beside it. "
-        "Everything is checked before anything is made; recordings are copied, never moved.",
+        "Everything is checked before anything is made; recordings are copied, never moved. "
+        "Ctrl+O, or the button beside a line, picks a file or chooses a value.",
         "Give the marker size, the ids on the tree, the shutter and the band: without them a "
         "frequency cannot be decided. All of it can be changed later (s on the trial).",
     )
     JUMPS = (Jump("f", "#form"),)
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("ctrl+o", "pick", "Pick a file"),
+        Binding("ctrl+o", "pick", "Pick, choose"),
         Binding("ctrl+s", "make", "Make the trial"),
     ]
 
@@ -56,15 +68,19 @@ class NewTrialPage(Page):
     def __init__(self, workspace: Path, like: Path | None = None) -> None:
         super().__init__(workspace)
         self._like = like
+        self._used: Mapping[str, tuple[str, ...]] = {}
 
-    def read(self) -> dict[str, str]:
-        """What the trial that was marked shares with the new one."""
-        return form_values(self._like) if self._like is not None else {}
+    def read(self) -> FormValues:
+        """What the trial that was marked shares with the new one; what was said before."""
+        return form_values(self.folder, self._like)
 
     def show(self, value: object) -> None:
         """Fill what is empty."""
-        if isinstance(value, dict) and self._like is not None:
-            for name, text in value.items():
+        if not isinstance(value, FormValues):
+            return
+        self._used = value.used
+        if self._like is not None:
+            for name, text in value.shared.items():
                 field = self.query_one(f"#{name}", Input)
                 field.value = field.value or text
             name = harmless(self._like.name, 40)
@@ -78,31 +94,28 @@ class NewTrialPage(Page):
             yield Picture(id="right-first", title="right, first frame")
         with VerticalScroll(id="form", classes="pane", can_focus=False) as form:
             form.border_title = "New trial"
-            for field in FIELDS:
-                with Horizontal():
-                    yield Label(field.label, markup=False)
-                    yield Input(placeholder=field.hint, id=field.name, compact=True)
-                    if field.path:
-                        yield Button("…", id=f"pick-{field.name}", compact=True)
+            yield from form_rows(FIELDS)
             yield Button("Make the trial", id="make", variant="primary")
 
     def on_mount(self) -> None:
         """Start at the name."""
         for side in SHOWN:
             self.query_one(f"#{side}-first", Picture).say(f"pick the {side} recording")
-        self.query_one("#trial").focus()
+        name = self.query_one("#trial", Input)
+        name.value = free_name(folder.name for folder in self.olive.trials)
+        name.focus()
 
     @property
     def values(self) -> dict[str, str]:
         """What has been typed."""
-        return {field.name: self.query_one(f"#{field.name}", Input).value for field in FIELDS}
+        return form_values_of(self, FIELDS)
 
     # -- picking --------------------------------------------------------------------------------
 
     def action_pick(self) -> None:
-        """Pick the file of the field with the cursor."""
+        """Pick the file, or choose the value, of the field with the cursor."""
         name = (self.focused.id or "") if self.focused else ""
-        if name in PATHS:
+        if any(field.name == name for field in FIELDS):
             self._pick(name)
 
     @on(Button.Pressed)
@@ -114,8 +127,23 @@ class NewTrialPage(Page):
             self._pick(name)
 
     def _pick(self, name: str) -> None:
-        label = next(f.label for f in FIELDS if f.name == name)
-        self.app.push_screen(PickScreen(label, self._start()), partial(self._picked, name))
+        field = next(f for f in FIELDS if f.name == name)
+        if field.path:
+            self.app.push_screen(
+                PickScreen(field.label, self._start()), partial(self._picked, name)
+            )
+        else:
+            value = self.values[name]
+            choices = tuple(dict.fromkeys((*self._used.get(name, ()), *field.choices)))
+            self.app.push_screen(
+                ChooseScreen(field.label, value, choices), partial(self._chosen, name)
+            )
+
+    def _chosen(self, name: str, text: str | None) -> None:
+        if text is not None:
+            field = self.query_one(f"#{name}", Input)
+            field.value = text
+            field.focus()
 
     def _start(self) -> Path:
         """Where to begin: beside what was named last, else the folder the app was started in."""
@@ -174,4 +202,5 @@ class NewTrialPage(Page):
             self.olive.show_error(plan)
         else:
             name, told = plan
-            self.olive.start(jobs.make_trial(self.folder, name, told))
+            record = record_of(self.values)
+            self.olive.start(jobs.make_trial(self.folder, name, told, record))

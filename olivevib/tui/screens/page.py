@@ -17,12 +17,12 @@ from textual.widgets import Footer
 from textual.worker import get_current_worker
 
 from olivevib.errors import OlivevibError
-from olivevib.tui.loader import guarded
+from olivevib.tui.loader import change_trial, guarded
 from olivevib.tui.widgets.title import Title
 from olivevib.tui.widgets.work_line import WorkLine
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     from olivevib.tui.app import OlivevibApp
 
@@ -64,6 +64,9 @@ class Page(Screen[None]):
         def __init__(self, value: object) -> None:
             super().__init__()
             self.value = value
+
+    class Saved(Message):
+        """A setting has been written."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__()
@@ -117,6 +120,23 @@ class Page(Screen[None]):
 
     def show(self, value: object) -> None:
         """Show the values that ``read`` gave."""
+
+    def save_settings(self, changes: Mapping[str, object], folder: Path | None = None) -> None:
+        """Write settings into trial.toml (of ``folder``) in a thread; None takes one out.
+
+        Every screen reads its files again; an error is shown, and then nothing was written.
+        """
+        self._saving(changes, folder or self.folder)
+
+    @work(thread=True, group="save")
+    def _saving(self, changes: Mapping[str, object], folder: Path) -> None:
+        saved = guarded(lambda: change_trial(folder, changes))
+        wrong = isinstance(saved, OlivevibError)
+        self.post_message(self.Read(saved) if wrong else self.Saved())
+
+    def on_page_saved(self) -> None:
+        """A setting has been written."""
+        self.olive.revision += 1
 
     def recolour(self) -> None:
         """The theme changed: draw again."""

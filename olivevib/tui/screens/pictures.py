@@ -18,6 +18,7 @@ from olivevib.errors import OlivevibError
 from olivevib.tui.frames import SIDES, FrameReader, Shot
 from olivevib.tui.loader import guarded
 from olivevib.tui.screens.page import Command, Help, Jump, Page
+from olivevib.tui.screens.tuning import TuningPage
 from olivevib.tui.views.picture import Window
 from olivevib.tui.views.shot import inset_of, outlines_of, shot_words
 from olivevib.tui.widgets.picture import Picture
@@ -25,7 +26,7 @@ from olivevib.tui.widgets.picture import Picture
 PLAY_HZ = 3.0  # more would slow a running stage down
 
 
-class PicturesPage(Page):
+class PicturesPage(TuningPage):
     """What the cameras saw and what was tracked in it."""
 
     NAME = "pictures"
@@ -33,8 +34,9 @@ class PicturesPage(Page):
         "One camera's recording, with a bracket and the id about every tracked marker; beside it "
         "a window of 280 × 210 pixels about the marked one, with the trail of its last frames. "
         "Before tracking the pictures are shown alone: use them to judge light and focus. i finds "
-        "the markers in this picture alone with the parameters of now (the paper's INITIALIZE): "
-        "change detection.* in the settings and come back to see the effect.",
+        "the markers in this picture alone (the paper's INITIALIZE). p shows the six parameters: "
+        "each change shows its effect on this picture at once; Ctrl+S keeps them, t tracks, "
+        "u goes into space (STEREO 3D).",
         "A marker should be at least 40 pixels wide, its bars even grey, its white not burnt "
         "out, its edges sharp also while it moves; seen in 95 % of the frames or more.",
     )
@@ -43,7 +45,6 @@ class PicturesPage(Page):
         Binding("space", "play", "Play, stop"),
         Binding("o,tab", "camera", "Other camera", key_display="o"),
         Binding("z", "zoom", "Window"),
-        Binding("i", "initialise", "Find markers now", show=False),
         Binding("right_square_bracket", "marker(1)", "Next marker", key_display="]"),
         Binding("left_square_bracket", "marker(-1)", "Marker before", show=False, key_display="["),
         Binding("right,full_stop", "step(1)", "Next frame", show=False),
@@ -56,13 +57,13 @@ class PicturesPage(Page):
     _shot: Shot | None = None
     _side = SIDES[0]
     _playing: Timer | None = None
-    _detecting = False
 
     def body(self) -> ComposeResult:
         """Whole picture and window."""
         with Horizontal(id="pictures"):
             yield Picture(id="whole", title="left camera")
             yield Picture(id="inset", title="window")
+        yield self.table()
         yield Static(id="why", markup=False)
 
     def on_mount(self) -> None:
@@ -82,7 +83,9 @@ class PicturesPage(Page):
         return self._take(self._reader, self._side, self._shot.index if self._shot else 0)
 
     def _take(self, reader: FrameReader, side: str, index: int) -> Shot:
-        return (reader.initialised if self._detecting else reader.shot)(side, index)
+        if self.detecting:
+            return reader.initialised(side, index, self.tried)
+        return reader.shot(side, index)
 
     @work(thread=True, exclusive=True, group="frame")
     def _go(self, side: str, index: int) -> None:
@@ -141,8 +144,10 @@ class PicturesPage(Page):
         self.show(self._shot)
 
     def commands(self) -> list[Command]:
-        """Every marker of the picture."""
-        return [Command(f"Marker {i}", partial(self._choose, i)) for i in self._ids]
+        """Every marker of the picture, and the paper's own words."""
+        return self.paper_commands() + [
+            Command(f"Marker {i}", partial(self._choose, i)) for i in self._ids
+        ]
 
     # -- keys -----------------------------------------------------------------------------------
 
@@ -151,9 +156,8 @@ class PicturesPage(Page):
         if self._shot is not None:
             self._go(self._side, self._shot.index + frames)
 
-    def action_initialise(self) -> None:
-        """The paper's INITIALIZE on this picture, with the parameters of now; or the tracks."""
-        self._detecting = not self._detecting
+    def retake(self) -> None:
+        """Show the present picture again."""
         self.action_step(0)
 
     def action_camera(self) -> None:

@@ -52,6 +52,7 @@ class ResultsPage(Page):
         Binding("right", "peak(1)", "Cursor to the next peak", show=False),
         Binding("left", "peak(-1)", "Cursor to the peak before", show=False),
         Binding("m", "page('motion')", "Motion", show=False),
+        Binding("g", "page('spectrogram')", "Spectrogram", show=False),
         Binding("e", "page('report')", "Report", show=False),
     ]
     _results: Results | None = None

@@ -5,14 +5,13 @@ from __future__ import annotations
 from functools import partial
 from typing import ClassVar
 
-from textual import on, work
+from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.message import Message
 from textual.widgets import DataTable, Static
 
 from olivevib.errors import OlivevibError
-from olivevib.tui.loader import change_trial, guarded, setting_values
+from olivevib.tui.loader import guarded, setting_values
 from olivevib.tui.screens.edit import EditScreen
 from olivevib.tui.screens.page import Command, Help, Jump, Page
 from olivevib.tui.views.setting_rows import (
@@ -42,9 +41,6 @@ class SettingsPage(Page):
         Binding("right_square_bracket", "section", "Next section", key_display="]"),
     ]
     _rows: tuple[SettingRow, ...] = ()
-
-    class Saved(Message):
-        """A setting has been written."""
 
     def body(self) -> ComposeResult:
         """One table."""
@@ -96,16 +92,11 @@ class SettingsPage(Page):
 
     def _typed(self, row: SettingRow, text: str | None) -> None:
         if text is not None and text != row.value:
-            self._save(row, text)
-
-    @work(thread=True, group="save")
-    def _save(self, row: SettingRow, text: str) -> None:
-        saved = guarded(lambda: change_trial(self.folder, change_of(row, text)))
-        self.post_message(self.Read(saved) if isinstance(saved, OlivevibError) else self.Saved())
-
-    def on_settings_page_saved(self) -> None:
-        """Every screen reads its files again."""
-        self.olive.revision += 1
+            change = guarded(lambda: change_of(row, text))
+            if isinstance(change, OlivevibError):
+                self.olive.show_error(change)
+            else:
+                self.save_settings(change)
 
     def action_section(self) -> None:
         """Move to the first setting of the next section."""

@@ -16,6 +16,7 @@ from textual.widgets import DataTable, Static
 from olivevib.tui import jobs
 from olivevib.tui.harmless import plain
 from olivevib.tui.loader import STAGE_NAMES, TrialFacts, trial_facts
+from olivevib.tui.screens.edit import EditScreen
 from olivevib.tui.screens.error import error_text
 from olivevib.tui.screens.page import Command, Help, Jump, Page
 from olivevib.tui.widgets.title import Title
@@ -60,6 +61,8 @@ class TrialPage(Page):
         Binding("s", "page('settings')", "Settings"),
         Binding("b", "page('calibration')", "Board and calibration", show=False),
         Binding("m", "page('motion')", "Motion over time", show=False),
+        Binding("g", "page('spectrogram')", "Spectrogram", show=False),
+        Binding("o", "notes", "Notes", show=False),
         Binding("c", "page('compare')", "Compare with accelerometer", show=False),
         Binding("k", "page('pictures')", "Pictures with markers", show=False),
         Binding("x", "check", "Check every file", show=False),
@@ -156,6 +159,18 @@ class TrialPage(Page):
 
     def _run_stage(self, stage: str) -> None:
         self.olive.start(jobs.run_one(self.folder, stage))
+
+    def action_notes(self) -> None:
+        """Write down what should be known later."""
+        facts = getattr(self, "_facts", None)
+        if facts is not None:
+            hint = "anything worth knowing later; stands in the report"
+            screen = EditScreen("session.notes", hint, facts.notes)
+            self.app.push_screen(screen, self._noted)
+
+    def _noted(self, text: str | None) -> None:
+        if text is not None:
+            self.save_settings({"session.notes": text})
 
     def action_check(self) -> None:
         """Read every file from end to end."""

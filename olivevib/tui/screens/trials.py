@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
@@ -16,6 +17,7 @@ from textual.worker import get_current_worker
 
 from olivevib.tui import jobs
 from olivevib.tui.loader import STAGE_NAMES, TrialRow, trial_folders, trial_row
+from olivevib.tui.screens.edit import EditScreen
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.views.trial_list import columns_of, empty_text, matching, trial_cells, why_text
 
@@ -44,10 +46,14 @@ class TrialsPage(Page):
         Binding("enter", "open", "Open", priority=False),
         Binding("n", "new", "New trial"),
         Binding("slash", "search", "Search", key_display="/"),
+        Binding("c", "capture", "Capture"),
         Binding("r", "run", "Run"),
         Binding("v", "results", "Results", show=False),
         Binding("N", "copy", "New trial with the settings of this one", show=False),
         Binding("g", "demo", "Make a simulated trial", show=False),
+        Binding("o", "notes", "Notes", show=False),
+        Binding("d", "archive", "Archive, or take back", show=False),
+        Binding("h", "archived", "Show archived trials too", show=False),
         Binding("f5", "reload", "Read again", show=False),
     ]
 
@@ -62,6 +68,7 @@ class TrialsPage(Page):
         super().__init__(folder)
         self._rows: dict[Path, TrialRow] = {}
         self._shown: list[Path] = []
+        self._all = False
 
     def body(self) -> ComposeResult:
         """Search, table, why the marked trial is as it is; or what to do first."""
@@ -106,7 +113,10 @@ class TrialsPage(Page):
     @on(RowRead)
     def _row_read(self, message: RowRead) -> None:
         row = message.row
+        was = self._rows.get(row.folder)
         self._rows[row.folder] = row
+        if row.archived and not self._all and (was is None or not was.archived):
+            self._fill()
         if row.folder in self._shown:
             table = self.query_one("#trials", DataTable)
             at = self._shown.index(row.folder)
@@ -122,14 +132,18 @@ class TrialsPage(Page):
     def _fill(self) -> None:
         table = self.query_one("#trials", DataTable)
         marked = self.marked or self.folder / "trials" / self.olive.kept.trial
-        found = matching(self._rows.values(), self.query_one("#search", Input).value)
+        rows = [row for row in self._rows.values() if self._all or not row.archived]
+        hidden = len(self._rows) - len(rows)
+        found = matching(rows, self.query_one("#search", Input).value)
         self._shown = [row.folder for row in found[:MOST_ROWS]]
         table.clear(columns=True)
         table.add_columns(*columns_of(self.size.width, STAGE_NAMES))
         for row in found[:MOST_ROWS]:
             table.add_row(*self._cells(row))
         more = len(found) - len(self._shown)
-        table.border_subtitle = f"{more} more: search with /" if more else ""
+        parts = [f"{more} more: search with /"] if more else []
+        parts += [f"{hidden} archived: h shows them"] if hidden else []
+        table.border_subtitle = " · ".join(parts)
         if marked in self._shown:
             table.move_cursor(row=self._shown.index(marked))
         self._explain()
@@ -183,6 +197,29 @@ class TrialsPage(Page):
         """Read the folder again."""
         self.reload()
 
+    def action_archived(self) -> None:
+        """Show archived trials too, or not."""
+        self._all = not self._all
+        self._fill()
+
+    def action_archive(self) -> None:
+        """Take the marked trial out of the list, or back into it; nothing on the disk moves."""
+        row = self._rows.get(self.marked) if self.marked else None
+        if row is not None:
+            self.save_settings({"session.archived": None if row.archived else True}, row.folder)
+
+    def action_notes(self) -> None:
+        """Write down what should be known later of the marked trial."""
+        row = self._rows.get(self.marked) if self.marked else None
+        if row is not None:
+            hint = "anything worth knowing later; stands in the report"
+            screen = EditScreen(f"notes on {row.name}", hint, row.notes)
+            self.app.push_screen(screen, partial(self._noted, row.folder))
+
+    def _noted(self, folder: Path, text: str | None) -> None:
+        if text is not None:
+            self.save_settings({"session.notes": text}, folder)
+
     def action_demo(self) -> None:
         """Make a simulated trial with known truth."""
         self.olive.start(jobs.make_demo(self.folder))
@@ -192,6 +229,12 @@ class TrialsPage(Page):
         from olivevib.tui.screens.new_trial import NewTrialPage
 
         self.app.push_screen(NewTrialPage(self.folder))
+
+    def action_capture(self) -> None:
+        """Record a trial with cameras at this computer."""
+        from olivevib.tui.screens.capture import CapturePage
+
+        self.app.push_screen(CapturePage(self.folder))
 
     def action_copy(self) -> None:
         """Make a new trial with the settings of the marked one."""

@@ -69,7 +69,7 @@ def motion_plot(
     half = _half(plot, inside)
     for axis in range(3):
         _axis(cells, plot, axis, (shown, half, height, columns), palette)
-    _bands(cells, plot.bands, shown, columns, palette)
+    band_row(cells, plot.bands, shown, columns, palette)
     return cells.text()
 
 
@@ -97,7 +97,7 @@ def _axis(
         cells.dots(frame.x, frame.y, polyline(frame.shape, x, y), style)
 
 
-def _bands(
+def band_row(
     cells: Cells,
     bands: tuple[Band, ...],
     shown: tuple[float, float],

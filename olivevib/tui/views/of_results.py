@@ -127,12 +127,17 @@ def marks_of(line: Line, rate_hz: float) -> tuple[Mark, ...]:
     return (Mark(seen, words, decided),)
 
 
+def bands_of(vibration: Vibration | None) -> tuple[Band, ...]:
+    """The phases as stretches of time; none before analyse."""
+    return tuple(Band(p.name, p.start_s, p.end_s) for p in vibration.phases) if vibration else ()
+
+
 def motion_of(
     trajectory: Trajectory, vibration: Vibration | None, marker: int, name: str
 ) -> MotionPlot:
     """Displacement of one marker over the trial clock, phases marked."""
     k = int(np.flatnonzero(trajectory.ids == marker)[0])
-    bands = tuple(Band(p.name, p.start_s, p.end_s) for p in vibration.phases) if vibration else ()
+    bands = bands_of(vibration)
     path = path_mm(trajectory, k, None)
     t_s = trajectory.sample_t_s[:, k] if path.size else np.empty(0)
     title = f"marker {name} · displacement from its mean · {trajectory.frame}"

@@ -28,11 +28,12 @@ def trial_cells(row: TrialRow, width: int, palette: Palette) -> tuple[Text, ...]
     states = [s.state for s in row.stages] or ["…"] * 5
     cells = [
         plain(row.name, 28 if wide else 34),
-        quality_cell(row.quality.word, palette),
+        quality_cell(row.word, palette),
         *(state_cell(s, palette, word=wide) for s in states),
     ]
     if wide:
-        about = ("simulated  " if row.simulated else "") + row.about
+        about = ("archived  " if row.archived else "") + ("simulated  " if row.simulated else "")
+        about += row.about
         cells.append(plain(about, 40, "italic" if row.simulated else ""))
     return tuple(cells)
 
@@ -42,7 +43,8 @@ def matching(rows: Iterable[TrialRow], words: str) -> list[TrialRow]:
     wanted = words.lower().split()
 
     def fits(row: TrialRow) -> bool:
-        text = f"{row.name} {row.about} {row.quality.word}".lower()
+        archived = "archived" if row.archived else ""
+        text = f"{row.name} {row.about} {row.word} {row.notes} {archived}".lower()
         return all(word in text for word in wanted)
 
     return [row for row in rows if fits(row)]
@@ -54,8 +56,10 @@ def why_text(row: TrialRow, palette: Palette) -> Text:
     out.append(f"{harmless(row.name, 60)} ", palette.accent)
     if row.about:
         out.append(f"{harmless(row.about, 120)} ", palette.muted)
-    out.append_text(quality_cell(row.quality.word, palette))
-    out.append(f": {harmless(row.quality.why, 300)}")
+    out.append_text(quality_cell(row.word, palette))
+    out.append(f": {harmless(row.why, 300)}")
+    if row.notes:
+        out.append(f"\n{harmless(row.notes, 160)}", palette.muted)
     open_ = [s for s in row.stages if s.state not in ("done", "missing")]
     for stage in open_[:3]:
         out.append(f"\n{stage.name} {stage.state}: {harmless(stage.reason, 160)}", palette.muted)
@@ -70,6 +74,7 @@ def empty_text(place: str, is_workspace: bool, palette: Palette) -> Text:
     out.append("holds no trial.\n\n" if is_workspace else "is no workspace yet.\n\n")
     for key, words in (
         ("n", "make a trial from two recordings"),
+        ("c", "record one with two cameras, or rehearse"),
         ("g", "make a simulated trial, to try everything"),
         ("?", "what this screen shows"),
         ("q", "leave, and start olivevib in another folder"),

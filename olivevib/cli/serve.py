@@ -1,0 +1,35 @@
+"""Verb serve: the app in a browser on this computer."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import shlex
+import sys
+
+from olivevib.cli.console import Console
+from olivevib.errors import UsageError
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
+
+def serve(arguments: argparse.Namespace, console: Console) -> int:
+    """Serve the app until Ctrl-C; every browser window gets an app of its own."""
+    if importlib.util.find_spec("textual_serve") is None:
+        raise UsageError(
+            "the app in a browser needs the package textual-serve, which is not installed.",
+            "It is an extra, because few need it.",
+            "Install it: pip install 'olivevib[serve]'",
+        )
+    from olivevib.cli.browser import LocalServer
+
+    if arguments.host not in LOOPBACK:
+        console.say(
+            f"warning: whoever reaches {arguments.host}:{arguments.port} can read and change "
+            "everything in this workspace."
+        )
+    command = shlex.join([sys.executable, "-m", "olivevib.tui"])
+    server = LocalServer(command, arguments.host, arguments.port)
+    console.say(f"Open {server.public_url} · Ctrl-C ends.")
+    server.serve()
+    return 0

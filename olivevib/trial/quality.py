@@ -1,0 +1,59 @@
+"""One word for how far a trial can be used as it is, and the state of its stages in words."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from olivevib.trial.trial import Trial
+
+
+@dataclass(frozen=True)
+class StageLine:
+    """One stage of a trial: its state and the reason, as words."""
+
+    name: str
+    state: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Quality:
+    """One word for how far a trial can be used as it is, and why."""
+
+    word: str
+    why: str
+
+
+def stage_lines(trial: Trial) -> tuple[StageLine, ...]:
+    """The stages in order; files of the trial are named from its folder on."""
+    here = f"{trial.folder.resolve()}{os.sep}"
+    near = f"{trial.folder}{os.sep}"
+    return tuple(
+        StageLine(name, state.state.value, state.reason.replace(here, "").replace(near, ""))
+        for name, state in trial.states().items()
+    )
+
+
+def quality_of(stages: tuple[StageLine, ...], trial: Trial) -> Quality:
+    """The worst thing that can be said of a trial, in one word."""
+    for word in ("failed", "stale", "missing", "blocked"):
+        bad = next((s for s in stages if s.state == word), None)
+        if bad is not None:
+            said = {"missing": "unfinished", "blocked": "unfinished"}.get(word, word)
+            return Quality(said, f"{bad.name}: {bad.reason}")
+    if not trial.vibration:
+        return Quality("unfinished", "there is nothing to analyse yet")
+    return _quality_of_results(trial)
+
+
+def _quality_of_results(trial: Trial) -> Quality:
+    for comparison in trial.comparison:
+        if comparison.verdict.value == "differs":
+            return Quality("differs", comparison.reason)
+    cautions = trial.cautions
+    if cautions:
+        return Quality("warnings", f"{len(cautions)}: {', '.join(c.code for c in cautions)}")
+    return Quality("clean", "every stage is done and none of them warned")

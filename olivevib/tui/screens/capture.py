@@ -1,0 +1,122 @@
+"""A recording with cameras at this computer: which ones, in which mode, of what."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import VerticalScroll
+from textual.widgets import Button, Input, Static
+
+from olivevib.errors import OlivevibError
+from olivevib.tui.capturing import FIELDS, REHEARSAL, Recording, told_of
+from olivevib.tui.loader import CameraLine, camera_lines, guarded
+from olivevib.tui.plan import free_name
+from olivevib.tui.screens.choose import ChooseScreen
+from olivevib.tui.screens.page import Help, Jump, Page
+from olivevib.tui.views.cameras import cameras_text
+from olivevib.tui.widgets.form import form_rows, form_values_of
+
+
+class CapturePage(Page):
+    """The form of ``olivevib capture``."""
+
+    NAME = "capture"
+    HELP_TEXT = Help(
+        "Two cameras at this computer, or two streams. What a camera sends is recorded as it is, "
+        "with a time stamp and a checksum for every picture; nothing is recorded before you press "
+        "Space on the next screen. Ctrl+R names the simulated cameras, to rehearse. With a board "
+        "the calibration board is recorded, into the same trial, before or after the tree.",
+        "1280 × 720 at 30 frames/s or more, an exposure of 2 ms or less, focus held by hand; both "
+        "cameras on USB ports of their own.",
+    )
+    JUMPS = (Jump("f", "#form"),)
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("ctrl+s", "run", "Run the cameras"),
+        Binding("ctrl+r", "rehearse", "Rehearse"),
+        Binding("ctrl+o", "pick", "Choose", show=False),
+    ]
+
+    def __init__(self, workspace: Path, trial: str = "") -> None:
+        super().__init__(workspace)
+        self._trial = trial
+
+    def body(self) -> ComposeResult:
+        """The cameras that are there, and the form."""
+        yield Static("looking for cameras …", id="cameras", classes="pane", markup=False)
+        with VerticalScroll(id="form", classes="pane", can_focus=False) as form:
+            form.border_title = "Capture"
+            yield from form_rows(FIELDS)
+            yield Button("Run the cameras", id="run", variant="primary")
+
+    def on_mount(self) -> None:
+        """Start at the name."""
+        self.query_one("#cameras").border_title = "Cameras at this computer"
+        name = free_name(folder.name for folder in self.olive.trials)
+        self.query_one("#trial", Input).value = self._trial or name
+        self.query_one("#trial").focus()
+
+    def read(self) -> tuple[CameraLine, ...]:
+        """Which cameras are there."""
+        return camera_lines()
+
+    def show(self, value: object) -> None:
+        """List them; where two are there, they are the left and the right one to begin with."""
+        if isinstance(value, tuple):
+            self.query_one("#cameras", Static).update(cameras_text(value, self.olive.palette))
+            for number, side in enumerate(("left", "right")):
+                field = self.query_one(f"#{side}", Input)
+                if len(value) > 1 and not field.value:
+                    field.value = str(number)
+
+    @on(Input.Submitted)
+    def _submitted(self) -> None:
+        """Enter goes to the next line."""
+        self.focus_next(Input)
+
+    def action_pick(self) -> None:
+        """Choose the value of the field with the cursor."""
+        self._choose((self.focused.id or "") if self.focused else "")
+
+    @on(Button.Pressed)
+    def _pressed(self, event: Button.Pressed) -> None:
+        name = event.button.id or ""
+        if name == "run":
+            self.action_run()
+        else:
+            self._choose(name.removeprefix("pick-"))
+
+    def _choose(self, name: str) -> None:
+        field = next((f for f in FIELDS if f.name == name), None)
+        if field is not None:
+            value = self.query_one(f"#{name}", Input).value
+            screen = ChooseScreen(field.label, value, field.choices)
+            self.app.push_screen(screen, partial(self._chosen, name))
+
+    def _chosen(self, name: str, text: str | None) -> None:
+        if text is not None:
+            field = self.query_one(f"#{name}", Input)
+            field.value = text
+            field.focus()
+
+    def action_run(self) -> None:
+        """Open both cameras and show what they see; nothing is recorded yet."""
+        told = guarded(lambda: told_of(form_values_of(self, FIELDS)))
+        if isinstance(told, OlivevibError):
+            self.olive.show_error(told)
+        elif self.olive.is_free():
+            from olivevib.tui.screens.live import LivePage
+
+            recording = Recording(self.folder, told)
+            self.app.push_screen(LivePage(self.folder, recording))
+
+    def action_rehearse(self) -> None:
+        """Name the simulated cameras."""
+        for side in ("left", "right"):
+            self.query_one(f"#{side}", Input).value = REHEARSAL
+        seconds = self.query_one("#seconds", Input)
+        seconds.value = seconds.value or "25"
