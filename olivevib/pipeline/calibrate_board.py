@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from olivevib.calibration.boards import Board
 from olivevib.calibration.calibrate import calibrate
 from olivevib.calibration.result import Calibration
 from olivevib.calibration.settings import CalibrationSettings, Shutter
+from olivevib.calibration.uncertainty import point_sigma
 from olivevib.errors import InputError
 from olivevib.geometry import StereoRig
 from olivevib.pipeline.boards import BoardRecording, board_reader, find_boards, trial_board
@@ -20,6 +21,7 @@ from olivevib.progress import Tick
 from olivevib.trial import Trial
 from olivevib.trial.records.calibration import CalibrationRecord
 
+BOARD_SHARE = 0.15  # a waved board that knows a row time no better tells none
 FEW_VIEWS = 3  # a camera that shows the board less often is diagnosed
 
 
@@ -37,7 +39,19 @@ def calibrate_board(trial: Trial, tick: Tick) -> tuple[StereoRig, CalibrationRec
     else:
         verb = calibrate
     result = verb(left.views, right.views, left.size_px, right.size_px, _settings(trial), tick)
-    return result.rig, _record(board, recordings, result)
+    return _with_row_times(result), _record(board, recordings, result)
+
+
+def _with_row_times(result: Calibration) -> StereoRig:
+    """The rig with the row times that the waved board showed, where it shows them well enough."""
+    cameras = []
+    for camera, value, sigma in zip(
+        (result.rig.left, result.rig.right), result.row_time_s, result.row_time_sigma_s, strict=True
+    ):
+        known = camera.row_time_source == "unknown" and sigma < BOARD_SHARE * abs(value)
+        told = {"row_time_s": float(value), "row_time_sigma_s": float(sigma)}
+        cameras.append(replace(camera, row_time_source="board", **told) if known else camera)
+    return replace(result.rig, left=cameras[0], right=cameras[1])
 
 
 def _settings(trial: Trial) -> CalibrationSettings:
@@ -83,6 +97,7 @@ def _record(
         residuals_left=_residuals(result, 0),
         residuals_right=_residuals(result, 1),
         holdout_mm=_distances(result),
+        board_poses=_poses(board, result),
         facts=_facts(recordings, result),
         dropped_views=tuple(
             f"{v.camera} frame {v.frame}: {v.reason}" for v in result.views if not v.used
@@ -96,6 +111,20 @@ def _residuals(result: Calibration, camera: int) -> Floats:
     r = result.residuals
     mine = (r.camera == camera) & (r.weight > 0)
     return np.hstack([r.px[mine], r.residual_px[mine]])
+
+
+def _poses(board: Board, result: Calibration) -> Floats:
+    """Frame, sigma of the direction rad, R and t of the board where both cameras saw it (V, 14)."""
+    poses = result.poses
+    points = board.points_mm
+    spread = float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    rows = []
+    for k in np.flatnonzero(poses.both):
+        middle = (poses.R[k] @ points.mean(axis=0) + poses.t_mm[k])[None]
+        depth = point_sigma(result.rig, middle, result.point_sigma_px).frame_mm[0, 2]
+        sigma = depth / (spread * np.sqrt(len(points)))
+        rows.append([poses.frame[k], sigma, *poses.R[k].ravel(), *poses.t_mm[k]])
+    return np.array(rows, dtype=np.float64).reshape(-1, 14)
 
 
 def _distances(result: Calibration) -> Floats:

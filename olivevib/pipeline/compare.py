@@ -41,8 +41,7 @@ def compare(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     for sensor in bound:
         record = read_accelerometer(trial.path(sensor.file), sensor_options(trial, sensor))
         cautions.extend(record.cautions)
-        point = _at_sensor(trajectory, motion, sensor)
-        results.append(_one(trial, point, sensor, record, tick))
+        results.append(compare_sensor(trial, trajectory, motion, (sensor, record), tick))
     write_stage(trial.folder / "comparison.h5", comparison_file(results, cautions, now))
     return tuple(cautions)
 
@@ -86,13 +85,16 @@ def _at_sensor(
     return body_point(trajectory, motion[marker], marker, sensor.lever_mm)
 
 
-def _one(
+def compare_sensor(
     trial: Trial,
-    point: Samples,
-    sensor: Accelerometer,
-    record: AccelerometerRecord,
+    trajectory: Trajectory,
+    motion: Mapping[int, Samples],
+    of: tuple[Accelerometer, AccelerometerRecord],
     tick: Tick,
 ) -> Comparison:
+    """One sensor, and what it recorded, against the marker it is bound to."""
+    sensor, record = of
+    point = _at_sensor(trajectory, motion, sensor)
     exposure = trial.settings.cameras.left.exposure_ms
     settings = ComparisonSettings(exposure_s=(exposure or 0.0) * 1e-3)
     marker = -1 if sensor.marker is None else sensor.marker

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from olivevib.arrays import Floats
+from olivevib.calibration.trust import cautions_of
 from olivevib.errors import Caution, InputError
 from olivevib.files.store import write_stage
 from olivevib.geometry import StereoRig
 from olivevib.pipeline.fitted import fitted_samples, with_lines
 from olivevib.pipeline.libraries import corners_mm, trial_library
 from olivevib.pipeline.motions import marker_motion, surveyed
+from olivevib.pipeline.rig_in_use import chosen_world, rig_trust
 from olivevib.pipeline.sampling_time import (
     TrialTimes,
     fit_trial,
@@ -24,6 +26,7 @@ from olivevib.progress import Tick, silent
 from olivevib.reconstruction import Reconstruction, TrialClock, clock_from_motion
 from olivevib.reconstruction import reconstruct as reconstruct_tracks
 from olivevib.reconstruction.continuous import decided, trajectory_of
+from olivevib.reconstruction.world import placed, with_rig_sigma
 from olivevib.trial import Trial
 from olivevib.trial.records.tracks import StoredTracks
 from olivevib.trial.records.trajectory import trajectory_file
@@ -69,8 +72,19 @@ def reconstruct(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
         )
     if not (trial.settings.reconstruction.paper or _settled(trial, tracks, clock)):
         result = with_motion(trial, tracks, rig, corners, result, tick)
+    result = _in_its_frame(trial, result, rig, tick)
+    told = cautions_of(rig_trust(tracks, rig, corners))
+    result = replace(result, cautions=(*result.cautions, *told))
     write_stage(trial.folder / "trajectory.h5", trajectory_file(result, now))
     return result.cautions
+
+
+def _in_its_frame(
+    trial: Trial, result: Reconstruction, rig: StereoRig, tick: Tick
+) -> Reconstruction:
+    """The result in the frame that was chosen, with what the calibration adds to each sigma."""
+    world = chosen_world(trial, result, tick)
+    return with_rig_sigma(result if world is None else placed(result, world), rig)
 
 
 def _settled(trial: Trial, tracks: StoredTracks, clock: TrialClock) -> bool:

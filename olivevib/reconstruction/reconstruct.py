@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -30,10 +31,17 @@ class ReconstructionSettings:
 
     right_offset_ms: what to add to the right camera's stamps, ms, where it is known (empty: use the
     calibration's where both are one recording, else zero and said so).
+    frame: of the results: the left camera's, the calibration board's (board_frame: where it lay in
+    that frame of its recording; empty: in the view with the smallest sigma), or gravity's: x to the
+    right of the left camera, y away from it, z up. plumb: ids of two markers on a plumb line, the
+    upper one first; empty: gravity from the accelerometer at rest.
     """
 
     paper: bool = False
     right_offset_ms: float | None = None
+    frame: Literal["left camera", "board", "gravity"] = "left camera"
+    board_frame: int | None = None
+    plumb: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)

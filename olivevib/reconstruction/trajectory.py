@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,10 @@ class Trajectory:
     was seen (row and camera offset included); xyz_mm (N, M, 3) its centre, rotation_rad (N, M, 3)
     rotation vector of its plane, with sigmas; covariance_mm2 (N, M, 3, 3); state (N, M) of State;
     epipolar_px (N, M) signed epipolar distance before triangulation. NaN = not seen.
-    frame: "left camera", "board" or "gravity". method: "optimal", "linear-eigen" or "continuous".
+    sigma_rig_mm (N, M, 3): what the calibration adds, the same error in all frames (not in
+    sigma_xyz_mm, nor in amplitudes); None where the rig does not say.
+    frame: "left camera", "board" or "gravity"; X_frame = R_world_left X_left + t_world_left_mm.
+    method: "optimal", "linear-eigen" or "continuous".
     """
 
     t_s: Floats
@@ -55,6 +58,9 @@ class Trajectory:
     frame: str
     method: str
     fits: tuple[ContinuousFit, ...] = ()
+    sigma_rig_mm: Floats | None = None
+    R_world_left: Floats = field(default_factory=lambda: np.eye(3))
+    t_world_left_mm: Floats = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         t_s = floats("t_s", self.t_s, (None,))
@@ -72,8 +78,17 @@ class Trajectory:
         object.__setattr__(self, "t_s", t_s)
         object.__setattr__(self, "ids", ids)
         object.__setattr__(self, "state", ints("state", self.state, (n, m)))
+        shapes |= {"R_world_left": (3, 3), "t_world_left_mm": (3,)}
+        if self.sigma_rig_mm is not None:
+            shapes["sigma_rig_mm"] = (n, m, 3)
         for name, shape in shapes.items():
             object.__setattr__(self, name, floats(name, getattr(self, name), shape, nan=True))
+
+    @property
+    def left_camera_mm(self) -> Floats:
+        """Positions (N, M, 3) in the left camera's frame, whatever ``frame`` is."""
+        out: Floats = (self.xyz_mm - self.t_world_left_mm) @ self.R_world_left
+        return out
 
     @property
     def seen(self) -> Bools:

@@ -67,7 +67,7 @@ def _distance_mm(trajectory: Trajectory | None) -> float:
     """How far the scene reaches: the median distance of what was seen, mm."""
     if trajectory is None or not trajectory.seen.any():
         return 1000.0
-    return float(np.median(np.linalg.norm(trajectory.xyz_mm[trajectory.seen], axis=1)))
+    return float(np.median(np.linalg.norm(trajectory.left_camera_mm[trajectory.seen], axis=1)))
 
 
 def _cameras(rig: StereoRig) -> tuple[tuple[str, CameraModel, tuple[Floats, Floats]], ...]:
@@ -119,7 +119,7 @@ def _frame(ax: Axes, figure: Figure) -> None:
 
 def _paths(ax: Axes, view: _View, trajectory: Trajectory, names: Mapping[int, str]) -> None:
     for m, marker_id in enumerate(trajectory.ids):
-        path = trajectory.xyz_mm[:, m]
+        path = trajectory.left_camera_mm[:, m]
         if not trajectory.seen[:, m].any():
             continue
         middle = view.flat(np.nanmean(path, axis=0)[None])[0]

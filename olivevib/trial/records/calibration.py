@@ -16,7 +16,7 @@ from olivevib.trial.records.cautions import cautions_from, cautions_text
 from olivevib.trial.stages import BY_NAME, Fingerprint
 
 STAGE = BY_NAME["calibrate"]
-NONE_4, NONE_2 = np.empty((0, 4)), np.empty((0, 2))
+NONE_4, NONE_2, NONE_14 = np.empty((0, 4)), np.empty((0, 2)), np.empty((0, 14))
 NUMBERS = (
     "right_offset_s",
     "right_offset_sigma_s",
@@ -35,6 +35,8 @@ class CalibrationRecord:
 
     residuals_left, residuals_right (K, 4): pixel u, v of each board point and its residual du, dv.
     holdout_mm (D, 2): true distance and error of each pair of points on unused frames, mm.
+    board_poses (V, 14): where the board was in frames that both cameras saw: frame, sigma of its
+    direction rad, R (3, 3) row by row and t mm to the left camera.
     facts: further numbers and words by name, unit in the name. views: one line a dropped view.
     """
 
@@ -52,6 +54,7 @@ class CalibrationRecord:
     residuals_left: Floats = field(default_factory=lambda: NONE_4)
     residuals_right: Floats = field(default_factory=lambda: NONE_4)
     holdout_mm: Floats = field(default_factory=lambda: NONE_2)
+    board_poses: Floats = field(default_factory=lambda: NONE_14)
     facts: Mapping[str, Any] = field(default_factory=dict)
     dropped_views: tuple[str, ...] = ()
     cautions: tuple[Caution, ...] = ()
@@ -60,6 +63,8 @@ class CalibrationRecord:
         for name in ("residuals_left", "residuals_right"):
             object.__setattr__(self, name, floats(name, getattr(self, name), (None, 4)))
         object.__setattr__(self, "holdout_mm", floats("holdout_mm", self.holdout_mm, (None, 2)))
+        poses = floats("board_poses", self.board_poses, (None, 14), nan=True)
+        object.__setattr__(self, "board_poses", poses)
 
 
 def calibration_file(record: CalibrationRecord, now: Fingerprint) -> StageFile:
@@ -73,6 +78,9 @@ def calibration_file(record: CalibrationRecord, now: Fingerprint) -> StageFile:
     }
     variables["holdout/distance"] = Variable(
         ("pair", "true_and_error"), record.holdout_mm, "mm", "distances on unused frames"
+    )
+    variables["board/pose"] = Variable(
+        ("view", "frame_sigma_R_t"), record.board_poses, "1", "board in the left camera's frame"
     )
     return StageFile(
         stage=STAGE.name,
@@ -102,6 +110,11 @@ def calibration_from(file: StageFile) -> CalibrationRecord:
         residuals_left=np.asarray(file.variables["left/residual"].values),
         residuals_right=np.asarray(file.variables["right/residual"].values),
         holdout_mm=np.asarray(file.variables["holdout/distance"].values),
+        board_poses=(
+            np.asarray(file.variables["board/pose"].values)
+            if "board/pose" in file.variables
+            else NONE_14
+        ),
         facts=json.loads(str(get["facts"])),
         dropped_views=tuple(json.loads(str(get["dropped_views"]))),
         cautions=cautions_from(get["cautions"]),

@@ -17,6 +17,7 @@ from olivevib.trial.stages import BY_NAME, Fingerprint
 
 STAGE = BY_NAME["reconstruct"]
 WORDS = tuple(s.word for s in State)
+_UNTURNED = "[[1,0,0],[0,1,0],[0,0,1]]"
 XYZ = "x right, y down, z forward"
 
 
@@ -43,10 +44,13 @@ def trajectory_file(result: Reconstruction, now: Fingerprint) -> StageFile:
             ),
             "state": Variable(nm, t.state, "1", "why a sample is there or not", WORDS),
             "epipolar": Variable(nm, t.epipolar_px, "px", "epipolar residual"),
+            **_rig_part(t, axes),
             **(motion_columns(result.motion) if result.motion else {}),
         },
         attributes={
             "frame": t.frame,
+            "R_world_left": json.dumps(t.R_world_left.tolist()),
+            "t_world_left_mm": json.dumps(t.t_world_left_mm.tolist()),
             "method": t.method,
             "clock": json.dumps(_clock(result.clock)),
             "motion": motion_text(result.motion) if result.motion else "",
@@ -55,6 +59,13 @@ def trajectory_file(result: Reconstruction, now: Fingerprint) -> StageFile:
             "cautions": cautions_text(result.cautions),
         },
     )
+
+
+def _rig_part(t: Trajectory, axes: tuple[str, ...]) -> dict[str, Variable]:
+    if t.sigma_rig_mm is None:
+        return {}
+    words = "standard deviation that the calibration adds, the same error in all frames"
+    return {"sigma_rig": Variable(axes, t.sigma_rig_mm, "mm", words)}
 
 
 def _clock(clock: TrialClock) -> dict[str, float | str]:
@@ -93,6 +104,11 @@ def reconstruction_from(file: StageFile) -> Reconstruction:
         frame=str(file.attributes["frame"]),
         method=method,
         fits=fits if method == "continuous" else (),
+        sigma_rig_mm=get("sigma_rig") if "sigma_rig" in file.variables else None,
+        R_world_left=np.array(json.loads(str(file.attributes.get("R_world_left", _UNTURNED)))),
+        t_world_left_mm=np.array(
+            json.loads(str(file.attributes.get("t_world_left_mm", "[0,0,0]")))
+        ),
     )
     return Reconstruction(
         trajectory=trajectory,
