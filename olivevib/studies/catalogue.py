@@ -32,10 +32,21 @@ class Entry:
 
 
 PAPER: tuple[Entry, ...] = (
+    Entry("6.1", "729 runs of the extraction, efficiency over the angle of view", "factorial:run"),
     Entry("6.3", "two toy cars on closed tracks, in step and 2 ms apart", "toy_cars:run"),
 )
 BENCHMARKS: tuple[Entry, ...] = (
+    Entry("detection", "all of the detection-… studies", "detection.everything:run"),
+    Entry("detection-rates", "markers found by size and tilt, beside peers", "detection.rates:run"),
+    Entry("detection-accuracy", "centres against bound and peers", "detection.accuracy:run"),
+    Entry("detection-honesty", "what the stated ellipses hold", "detection.honesty:run"),
+    Entry("detection-occlusion", "covered markers", "detection.hardship:occlusion"),
+    Entry("detection-blur", "motion blur in a full scan", "detection.hardship:blur"),
+    Entry("detection-light", "shadows, gradients, dappled sun", "detection.hardship:light"),
+    Entry("detection-clutter", "false markers in leaf clutter", "detection.clutter:run"),
+    Entry("detection-speed", "CPU time of a full scan, beside peers", "detection.speed:run"),
     Entry("exposure", "what the exposure takes from an amplitude", "exposure:run"),
+    Entry("vibration", "lines, conversion, damping, comparison, import, cost", "vibration:run"),
 )
 
 
