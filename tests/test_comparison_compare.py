@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from studies.records import (
+from olivevib.studies.vibration.records import (
     Logger,
     Shaker,
     acceleration,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from studies.records import Shaker, Tone, acceleration, camera, displacement, truth
+from olivevib.studies.vibration.records import Shaker, Tone, acceleration, camera, displacement, truth
 
 from olivevib.progress import Cancelled
 from olivevib.signals import Samples

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from studies.records import Tone, displacement
+from olivevib.studies.vibration.records import Tone, displacement
 
 from olivevib.vibration import LineSettings, SamplingFacts
 from olivevib.vibration.figures import NO_LINE, figures

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from studies.records import Tone, displacement, frequency_bound, noise_for, random_tone
+from olivevib.studies.vibration.records import Tone, displacement, frequency_bound, noise_for, random_tone
 
 from olivevib.vibration import LineSettings, LineStatus, SamplingFacts, dominant_line
 from olivevib.vibration.line import fit_line

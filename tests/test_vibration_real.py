@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from studies.records import acceleration
+from olivevib.studies.vibration.records import acceleration
 
 from olivevib.signals import GRAVITY_M_S2, fit_stamps
 from olivevib.vibration import (

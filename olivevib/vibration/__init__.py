@@ -13,6 +13,7 @@ from olivevib.vibration.phases import Phase, PhaseSettings, find_phases, find_se
 from olivevib.vibration.response import MarkerResponse, marker_response
 from olivevib.vibration.result import Vibration
 from olivevib.vibration.ridge import Ridge, camera_ridge, sensor_ridge
+from olivevib.vibration.sensor import SensorAnalysis, analyse_sensor
 from olivevib.vibration.survey import (
     MarkerSurvey,
     NamedMotion,
@@ -52,6 +53,7 @@ __all__ = [
     "Response",
     "Ridge",
     "SamplingFacts",
+    "SensorAnalysis",
     "Spectrum",
     "Survey",
     "Transmission",
@@ -59,6 +61,7 @@ __all__ = [
     "Vibration",
     "VibrationSettings",
     "analyse",
+    "analyse_sensor",
     "camera_ridge",
     "deflection_shape",
     "dominant_line",

@@ -11,6 +11,8 @@ from olivevib.signals import Samples, fit_stamps
 
 EVEN = 1e-6  # of a period: nearer to an even clock than this, a record counts as even
 
+_AS_IT_STANDS = 1e-7  # periods off an even clock: rounding of the stamps
+
 
 @dataclass(frozen=True)
 class Clock:
@@ -42,6 +44,11 @@ class Clock:
 
 def clock_of(t_s: Floats) -> Clock:
     """The clock of sample times t_s (N,), N >= 2."""
+    period = float(t_s[-1] - t_s[0]) / max(1, t_s.size - 1)
+    if period > 0:  # most records of a logger are even as they stand
+        worst = float(np.abs(t_s - (t_s[0] + period * np.arange(t_s.size))).max())
+        if worst < _AS_IT_STANDS * period:
+            return Clock(1 / period, t_s.size, t_s.size, worst / period)
     fit = fit_stamps(t_s)
     return Clock(fit.rate_hz, int(fit.sequence[-1]) + 1, t_s.size, fit.worst_s * fit.rate_hz)
 

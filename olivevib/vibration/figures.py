@@ -94,10 +94,13 @@ def figures(
 ) -> Figures:
     """Figures of values (N, 3), N >= 2, lasting duration_s; the mean of each axis is removed."""
     x = values - values.mean(axis=0)
-    rms = np.sqrt(np.mean(x**2, axis=0))
-    peak = np.abs(x).max(axis=0)
-    r = np.sqrt(np.sum(x**2, axis=1))
-    p95, p99 = np.percentile(r, [95, 99])
+    square = x * x
+    rms = np.sqrt(square.mean(axis=0))
+    low, high = x.min(axis=0), x.max(axis=0)
+    peak = np.maximum(high, -low)
+    power = square.sum(axis=1)
+    r = np.sqrt(power)
+    p50, p95, p99 = np.percentile(r, [50, 95, 99])
     direction, extent = _extent(x)
     accelerations = quantity == "acceleration"
     return Figures(
@@ -105,24 +108,26 @@ def figures(
         unit=unit,
         rms=rms,
         peak=peak,
-        peak_to_peak=np.ptp(x, axis=0),
+        peak_to_peak=high - low,
         crest=_ratio(peak, rms),
-        kurtosis=_ratio(np.mean(x**4, axis=0), rms**4),
+        kurtosis=_ratio(np.einsum("nc,nc->c", square, square) / len(x), rms**4),
         noise=noise,
         line_amplitude=line.amplitude,
         line_amplitude_sigma=line.sigma,
         thd_percent=line.thd_percent,
         resultant_mean=float(r.mean()),
-        resultant_rms=float(np.sqrt(np.mean(r**2))),
-        resultant_median=float(np.median(r)),
+        resultant_rms=float(np.sqrt(power.mean())),
+        resultant_median=float(p50),
         resultant_p95=float(p95),
         resultant_p99=float(p99),
         resultant_max=float(r.max()),
         extent=extent,
         extent_sigma=float(np.sqrt(2 * np.sum((direction * noise) ** 2))),
         class_percent=_shares(r) if accelerations else np.full(5, np.nan),
-        energy_m2_s3=float(np.mean(r**2) * duration_s) if accelerations else np.nan,
-        dose_m_s175=float((np.mean(r**4) * duration_s) ** 0.25) if accelerations else np.nan,
+        energy_m2_s3=float(power.mean() * duration_s) if accelerations else np.nan,
+        dose_m_s175=float((power @ power / len(x) * duration_s) ** 0.25)
+        if accelerations
+        else np.nan,
     )
 
 
@@ -166,5 +171,6 @@ def _extent(x: Floats) -> tuple[Floats, float]:
 
 
 def _shares(r: Floats) -> Floats:
-    counts = np.bincount(np.digitize(r, CLASSES_M_S2), minlength=5)
+    above = [float(np.count_nonzero(r >= limit)) for limit in CLASSES_M_S2]
+    counts = -np.diff([r.size, *above, 0.0])
     return np.asarray(100.0 * counts / r.size)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import gammaincinv
@@ -122,6 +122,7 @@ class _Search:
     clock: Clock
     block: int  # samples that were averaged into one
     sample_hz: float
+    scans: list[tuple[SineFit, Scan]] = field(default_factory=list)  # the last one made
 
     @classmethod
     def of(
@@ -194,8 +195,7 @@ class _Search:
         for _ in range(self.settings.neighbours):
             if float(fit.noise.max()) < _ROUNDING * float(fit.amplitude.max()):
                 break
-            lost = 0 if sway is None else sway.shape[1]
-            left = scan(self.t_s, fit.residual, self.left_top_hz, lost)
+            left = self.left(fit, sway)
             allowed = left.f_hz > (self.facts.sway_hz if sway is not None else 0.0)
             start = strongest(left, allowed, self.settings.false_alarm)
             if start is None:
@@ -205,6 +205,13 @@ class _Search:
                 break
             fit = wider
         return fit
+
+    def left(self, fit: SineFit, sway: Floats | None) -> Scan:
+        """The scan of what a fit leaves, made once for each fit."""
+        if not self.scans or self.scans[-1][0] is not fit:
+            lost = 0 if sway is None else sway.shape[1]
+            self.scans[:] = [(fit, scan(self.t_s, fit.residual, self.left_top_hz, lost))]
+        return self.scans[-1][1]
 
     def with_harmonics(
         self, f_hz: float, others: tuple[float, ...], sway: Floats | None
@@ -332,8 +339,7 @@ def _coloured(search: _Search, fit: SineFit, sway: Floats | None) -> Floats:
 
     var A = Sn/T and var f = 3 Sn/(pi^2 A^2 T^3) need the density *at* the line.
     """
-    lost = 0 if sway is None else sway.shape[1]
-    left = scan(search.t_s, fit.residual, search.left_top_hz, lost)
+    left = search.left(fit, sway)
     seen = fold(float(fit.f_hz[0]), search.clock.rate_hz)
     distance = np.abs(left.f_hz - seen) / search.bin_hz
     near = (distance < _LOCAL / 2) & (distance > 1)

@@ -14,6 +14,7 @@ from olivevib.vibration.sums import Complexes, fourier_sums
 OVERSAMPLING = 4  # scan points per 1/T
 _MANY = 2000  # samples from which an even record goes through the FFT
 _EVEN = 1e-6  # of a period
+_FAR = 64  # bins of 1/T from a fold: from there on cosine and sine are orthogonal to 1e-5
 _WELL_POSED = 1e-3  # determinant of cosine and sine after the mean, of its value far from folds
 
 
@@ -82,8 +83,10 @@ def scan(
         step = 1.0 / (period * fft.next_fast_len(int(np.ceil(1.0 / (step * period))), real=True))
     count = max(OVERSAMPLING + 1, int(np.floor(top_hz / step)) + 1)
     f_hz = np.asarray(np.arange(count) * step, dtype=np.float64)
-    sums = _even_sums(centred, period, f_hz) if even else _sums(t_s - t_s.mean(), centred, f_hz)
-    explained = _explained(n, *sums)
+    if even:
+        explained = _even_explained(centred, period, f_hz)
+    else:
+        explained = _explained(n, *_sums(t_s - t_s.mean(), centred, f_hz))
     keep = slice(OVERSAMPLING, None)
     return Scan(
         f_hz=f_hz[keep],
@@ -102,17 +105,23 @@ def _sums(since: Floats, centred: Floats, f_hz: Floats) -> tuple[Complexes, Comp
     return both[:, :-1], both[:, -1], fourier_sums(since, ones, 2 * step, count)[:, 0]
 
 
-def _even_sums(
-    centred: Floats, period: float, f_hz: Floats
-) -> tuple[Complexes, Complexes, Complexes]:
-    """The same sums of a long even record: one padded FFT and two Dirichlet kernels."""
+def _even_explained(centred: Floats, period: float, f_hz: Floats) -> Floats:
+    """The same of a long even record: one padded FFT; two Dirichlet kernels next to the folds.
+
+    Elsewhere cosine and sine are orthogonal to some 1/(pi f T), and 2|y|^2/n to its square.
+    """
     n = centred.shape[0]
     padded = round(1.0 / (period * float(f_hz[1])))
-    turns = f_hz * period
     y = fft.rfft(centred, padded, axis=0)[: f_hz.size]
-    y = y * np.exp(1j * np.pi * turns * (n - 1))[:, None]
+    out = (y.real**2 + y.imag**2) * (2.0 / n)
+    bins = _FAR * OVERSAMPLING
+    half = padded // 2
+    near = np.r_[: min(bins, f_hz.size), max(bins, min(half - bins, f_hz.size)) : f_hz.size]
+    turns = f_hz[near] * period
     kernels = [_dirichlet(k * turns, n).astype(np.complex128) for k in (1, 2)]
-    return y, kernels[0], kernels[1]
+    turned = y[near] * np.exp(1j * np.pi * turns * (n - 1))[:, None]
+    out[near] = _explained(n, turned, kernels[0], kernels[1])
+    return np.asarray(out)
 
 
 def _dirichlet(turns: Floats, n: int) -> Floats:

@@ -9,7 +9,8 @@ import numpy as np
 
 from olivevib.arrays import Bools, Floats
 from olivevib.signals import Samples, fit_stamps
-from olivevib.vibration.clock import measured
+from olivevib.vibration.blocks import block_means
+from olivevib.vibration.clock import clock_of, measured
 from olivevib.vibration.ridge import Ridge, camera_ridge, camera_rms, sensor_ridge, sensor_rms
 
 NAMES = ("rest", "start-up", "steady", "shut-down", "decay")
@@ -126,6 +127,10 @@ def _even_blocks(t_s: Floats, values: Floats) -> tuple[Floats, Floats]:
 
     Only for finding phases, where a held value in a gap moves nothing by more than the gap.
     """
+    clock = clock_of(t_s)
+    if clock.even:
+        block = max(1, int(clock.rate_hz / _SENSOR_BLOCK_HZ))
+        return block_means(t_s, values, block)
     fit = fit_stamps(t_s)
     count = int(fit.sequence[-1]) + 1
     held = np.maximum.accumulate(np.bincount(fit.sequence, np.arange(t_s.size), count))

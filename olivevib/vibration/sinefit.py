@@ -166,9 +166,15 @@ class _Problem:
         return float(self.since_s[-1] - self.since_s[0])
 
     def waves(self, f: Floats) -> tuple[Floats, Floats]:
-        each = f[list(self.tones.group)] * np.array(self.tones.multiples)
-        turn = 2 * np.pi * np.outer(self.since_s, each)
-        return np.cos(turn), np.sin(turn)
+        first = 2 * np.pi * np.outer(self.since_s, f)
+        cos, sin = np.cos(first), np.sin(first)
+        columns = np.empty((2, self.since_s.size, len(self.tones.group)))
+        for j, (k, m) in enumerate(zip(self.tones.group, self.tones.multiples, strict=True)):
+            c, s = cos[:, k], sin[:, k]
+            for _ in range(m - 1):
+                c, s = c * cos[:, k] - s * sin[:, k], s * cos[:, k] + c * sin[:, k]
+            columns[:, :, j] = c, s
+        return columns[0], columns[1]
 
     def solve(self, f: Floats) -> _State:
         cos, sin = self.waves(f)

@@ -5,28 +5,32 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
+from olivevib.arrays import Floats
 from olivevib.signals import Samples
 
 AXES = ("x", "y", "z")
 
 
-def displacement(t_s, mm):
+def displacement(t_s: ArrayLike, mm: ArrayLike) -> Samples:
+    """Samples of displacement."""
     return Samples(np.asarray(t_s), np.asarray(mm), "displacement", "mm", AXES)
 
 
-def acceleration(t_s, m_s2):
+def acceleration(t_s: ArrayLike, m_s2: ArrayLike) -> Samples:
+    """Samples of acceleration."""
     return Samples(np.asarray(t_s), np.asarray(m_s2), "acceleration", "m/s2", AXES)
 
 
-def rotation(rng, size=None):
+def rotation(rng: np.random.Generator, size: float | None = None) -> Floats:
     """A random rotation matrix; size: angle in rad instead of any."""
     axis = rng.normal(size=3)
     axis /= np.linalg.norm(axis)
     angle = rng.uniform(0, np.pi) if size is None else size
     k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)
+    return np.asarray(np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k))
 
 
 @dataclass(frozen=True)
@@ -34,29 +38,31 @@ class Tone:
     """One tone on three axes: x(t) = amplitude cos(2 pi f t + phase)."""
 
     f_hz: float
-    amplitude: np.ndarray
-    phase: np.ndarray
+    amplitude: Floats
+    phase: Floats
 
-    def at(self, t_s, derivative=0):
+    def at(self, t_s: Floats, derivative: int = 0) -> Floats:
+        """Its values (N, 3), or those of a derivative."""
         omega = 2 * np.pi * self.f_hz
         turn = omega * t_s[:, None] + self.phase + derivative * np.pi / 2
-        return omega**derivative * self.amplitude * np.cos(turn)
+        return np.asarray(omega**derivative * self.amplitude * np.cos(turn))
 
 
-def random_tone(rng, low_hz=2.0, high_hz=13.0):
+def random_tone(rng: np.random.Generator, low_hz: float = 2.0, high_hz: float = 13.0) -> Tone:
+    """A tone of any frequency in the band and any phases, 1, 0.5 and 0.2 on the axes."""
     return Tone(
         rng.uniform(low_hz, high_hz), np.array([1.0, 0.5, 0.2]), rng.uniform(0, 2 * np.pi, 3)
     )
 
 
-def frequency_bound(tone, t_s, noise):
+def frequency_bound(tone: Tone, t_s: Floats, noise: float) -> float:
     """Cramer-Rao bound of the frequency for white noise of one size on all axes, Hz."""
     spread = np.sum((t_s - t_s.mean()) ** 2)
     power = np.sum(tone.amplitude**2)
-    return noise / (2 * np.pi) * np.sqrt(2 / (power * spread))
+    return float(noise / (2 * np.pi) * np.sqrt(2 / (power * spread)))
 
 
-def noise_for(tone, decibels):
+def noise_for(tone: Tone, decibels: float) -> float:
     """Noise per axis at which the tone's total power stands so far above the total noise's."""
     return float(np.sqrt(np.sum(tone.amplitude**2) / 2 / 3 / 10 ** (decibels / 10)))
 
@@ -81,14 +87,15 @@ class Shaker:
     precession_hz: float = 0.0
 
     @property
-    def limits(self):
+    def limits(self) -> Floats:
         """Start of start-up, steady, shut-down, decay, and the end, s."""
-        return self.rest_s + np.cumsum(
-            [0, self.start_up_s, self.steady_s, self.shut_down_s, self.decay_s]
-        )
+        parts = [0, self.start_up_s, self.steady_s, self.shut_down_s, self.decay_s]
+        return np.asarray(self.rest_s + np.cumsum(parts))
 
 
-def truth(shaker, rng, rate_hz=20_000.0, margin_s=1.0):
+def truth(
+    shaker: Shaker, rng: np.random.Generator, rate_hz: float = 20_000.0, margin_s: float = 1.0
+) -> tuple[Floats, Floats]:
     """Times and displacement (mm, without sway) of the trial; margin: rest before and after."""
     a, b, c, d, end = shaker.limits
     t = np.arange(-margin_s, end + margin_s, 1 / rate_hz)
@@ -114,10 +121,18 @@ def truth(shaker, rng, rate_hz=20_000.0, margin_s=1.0):
         * np.exp(-shaker.damping * omega * since)
         * np.sin(omega * since)
     )
-    return t, path @ rotation(rng).T
+    return t, np.asarray(path @ rotation(rng).T)
 
 
-def camera(t, path, rng, times, noise_mm=0.06, exposure_s=0.0, shaker=None):
+def camera(
+    t: Floats,
+    path: Floats,
+    rng: np.random.Generator,
+    times: Floats,
+    noise_mm: float = 0.06,
+    exposure_s: float = 0.0,
+    shaker: Shaker | None = None,
+) -> Samples:
     """What a camera measures at times (mid-exposure): exact exposure mean, noise, sway."""
     spline = CubicSpline(t, path)
     if exposure_s:
@@ -140,11 +155,13 @@ class Logger:
     offset_s: float = 0.2
     drift: float = 30e-6
     t_mid_s: float = 5.0
-    bias: tuple = (0.3, -0.2, 0.35)
+    bias: tuple[float, float, float] = (0.3, -0.2, 0.35)
     noise_m_s2: float = 0.02 * 9.80665
 
 
-def sensor(t, path, rng, logger, turn):
+def sensor(
+    t: Floats, path: Floats, rng: np.random.Generator, logger: Logger, turn: Floats
+) -> Samples:
     """What the logger writes: acceleration in sensor axes (turn carries them to the camera's).
 
     Each sample is the mean over its period (a change of velocity): impacts keep their impulse.
