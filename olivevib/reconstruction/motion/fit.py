@@ -2,9 +2,58 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from olivevib.arrays import Floats
 from olivevib.geometry import StereoRig
 from olivevib.progress import Tick, silent
-from olivevib.reconstruction.motion.types import Anchor, MotionFit, MotionSettings, Observations
+from olivevib.reconstruction.motion import branches as br
+from olivevib.reconstruction.motion.decide import Decision, Facts, decide, keeps_branch
+from olivevib.reconstruction.motion.exposure import blur_gains
+from olivevib.reconstruction.motion.finish import (
+    degrees_of_freedom,
+    markers_of,
+    relinearise,
+    timing_of,
+)
+from olivevib.reconstruction.motion.free import fit_free
+from olivevib.reconstruction.motion.pixels import Pixels, look
+from olivevib.reconstruction.motion.prepare import (
+    layout,
+    model_of,
+    offset_sigma,
+    sway_precision,
+)
+from olivevib.reconstruction.motion.problem import Pose, Whitening
+from olivevib.reconstruction.motion.solve import Branch, Model, settle, with_frequency
+from olivevib.reconstruction.motion.start import about_sway
+from olivevib.reconstruction.motion.types import (
+    Anchor,
+    BranchTable,
+    MarkerMotion,
+    MotionFit,
+    MotionSettings,
+    Observations,
+)
+from olivevib.reconstruction.motion.wander import follow_speed
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Everything before the first frequency."""
+
+    observations: Observations
+    rig: StereoRig
+    anchor: Anchor
+    settings: MotionSettings
+    pixels: Pixels
+    poses: tuple[Pose, ...]
+    whites: tuple[Whitening, ...]
+    model: Model
+    start_s: float
+    end_s: float
 
 
 def fit_motion(
@@ -19,4 +68,155 @@ def fit_motion(
     clock: what is known of row times and offset from elsewhere. Nothing here looks at an
     accelerometer. Raises ValueError where no marker can be fitted.
     """
-    raise ValueError("no marker can be fitted")
+    settings = settings or MotionSettings()
+    if not settings.periodic:
+        return fit_free(observations, rig, clock, settings)
+    ready = prepare(observations, rig, clock, settings)
+    candidates = candidate_frequencies(ready)
+    sigma = offset_sigma(clock, settings)
+    weighed = br.weigh(ready.model, candidates, sigma, tick)
+    model, best = refine(ready, ready.model, weighed.branches[0])
+    kind, fast = "steady", 0.0
+    if chi2_of(model, best) > 1.3:
+        followed = follow_speed(ready.model, observations, band_of(ready), tick)
+        if followed is not None:
+            other, moved = refine(ready, followed[0], followed[1].branches[0])
+            if chi2_of(other, moved) < 0.8 * chi2_of(model, best):
+                kind, model, best, weighed = "wandering", other, moved, followed[1]
+            fast = followed[2].fastest_hz_s
+    return finished(ready, (model, best), weighed, kind, fast)
+
+
+def prepare(
+    observations: Observations, rig: StereoRig, anchor: Anchor, settings: MotionSettings
+) -> Prepared:
+    """Pixels, poses and the linear problem about the sway."""
+    pixels = look(observations, settings.knot_s, settings.harmonics)
+    clock, knots, start, end = layout(observations, anchor, settings, pixels.knot_s)
+    poses, problems, whites = about_sway(
+        observations, rig, pixels, clock, knots, sway_precision(settings)
+    )
+    model = model_of(problems, observations, anchor, settings, knots, clock.mid_s)
+    return Prepared(observations, rig, anchor, settings, pixels, poses, whites, model, start, end)
+
+
+def candidate_frequencies(ready: Prepared) -> Floats:
+    """All frequencies of the band, and a little beyond, that could show what was seen."""
+    rate, span = ready.observations.frame_rate_hz, ready.end_s - ready.start_s
+    low, high = ready.settings.band_hz
+    band = band_of(ready)
+    peaks = ready.pixels.peaks_hz + br.zone_peak(ready.model, rate, (low, high), span)
+    found = br.families(peaks, rate, band)
+    if not found.size:
+        raise ValueError(f"nothing periodic appears in the band of {low:g}-{high:g} Hz")
+    return br.merged(found, 0.3 / span)
+
+
+def band_of(ready: Prepared) -> tuple[float, float]:
+    """The band, and half a frame rate more where nobody declared it: rivals hide there."""
+    low, high = ready.settings.band_hz
+    more = 0.0 if ready.settings.band_declared else ready.observations.frame_rate_hz / 2
+    return low, high + more
+
+
+def refine(ready: Prepared, model: Model, branch: Branch) -> tuple[Model, Branch]:
+    """Linearise about the branch's own motion and settle again."""
+    gain = blur_gains(ready.observations, ready.settings, float(branch.theta[0]), 0.0)[0]
+    again = relinearise(model, branch, ready.observations, ready.rig, ready.poses, ready.whites)
+    again = replace(with_frequency(again, float(branch.theta[0])), gain=gain)
+    return again, settle(again, branch.theta)
+
+
+def chi2_of(model: Model, branch: Branch) -> float:
+    """Of the fit over the measured noise."""
+    return branch.chi2 / degrees_of_freedom(model)
+
+
+def table_of(ready: Prepared, weighed: br.Weighed, chi2: float) -> BranchTable:
+    """The branch table, log evidence divided by chi2 where that is above 1."""
+    rows = weighed.branches
+    evidence = np.array([b.evidence for b in rows]) / max(1.0, chi2)
+    evidence = evidence - evidence[0]
+    share = np.exp(evidence - evidence.max())
+    scale = np.array([b.theta[3] for b in rows]) / (ready.anchor.left_row_time_s or np.nan)
+    return BranchTable(
+        np.array([b.theta[0] for b in rows]),
+        evidence,
+        share / share.sum(),
+        np.array([b.theta[1] for b in rows]),
+        scale,
+    )
+
+
+def finished(
+    ready: Prepared, fitted: tuple[Model, Branch], weighed: br.Weighed, kind: str, fast: float
+) -> MotionFit:
+    """Motions, covariance, verdict; fast: largest change of the apparent frequency, Hz/s."""
+    model, best = fitted
+    chi2 = chi2_of(model, best)
+    table = table_of(ready, weighed, chi2)
+    plain = (False,) * ready.settings.harmonics
+    markers, timing = markers_of(
+        model, best, ready.observations, ready.poses, plain, max(1.0, chi2)
+    )
+    strongest = max(markers, key=lambda m: float(np.abs(m.cosine[0] + 1j * m.sine[0])[:3].max()))
+    amplitude = np.abs(strongest.cosine[0] + 1j * strongest.sine[0])[:3]
+    facts = Facts(
+        table=table,
+        rate_hz=ready.observations.frame_rate_hz,
+        span_s=ready.end_s - ready.start_s,
+        offset_s=float(best.theta[1]),
+        knot_s=model.knots.step_s,
+        chi2=chi2,
+        noise_scale=ready.pixels.scale,
+        strength=br.strength(model, best) / max(1.0, chi2),
+        amplitude_mm=amplitude,
+        sigma_mm=strongest.amplitude_sigma()[0, :3],
+        fast_hz_s=fast,
+    )
+    decision = decide(facts, ready.anchor, ready.settings)
+    return _result(ready, model, best, facts, decision, (markers, timing, kind))
+
+
+def _result(
+    ready: Prepared,
+    model: Model,
+    best: Branch,
+    facts: Facts,
+    decision: Decision,
+    parts: tuple[tuple[MarkerMotion, ...], Floats, str],
+) -> MotionFit:
+    markers, covariance, kind = parts
+    theta, row = best.theta, ready.observations.reference_row
+    f = float(theta[0])
+    timing = timing_of(theta, row, covariance)
+    timing = replace(timing, row_time_keeps=keeps_branch(f, facts.rate_hz))
+    pixel_amplitude = float(np.linalg.norm(facts.amplitude_mm)) * _px_per_mm(ready)
+    _, refused = blur_gains(ready.observations, ready.settings, f, pixel_amplitude)
+    psi = model.psi
+    return MotionFit(
+        kind=kind,
+        markers=tuple(replace(m, blind=decision.blind) for m in markers),
+        timing=timing,
+        branches=facts.table,
+        status=decision.status,
+        reasons=decision.reasons,
+        next_time=decision.next_time,
+        anchor=ready.anchor,
+        noise_scale=ready.pixels.scale,
+        noise_source="pixels" if ready.pixels.noise[0][1] > 0 else "localiser",
+        chi2=facts.chi2,
+        first_knot_s=model.knots.first_s,
+        knot_s=model.knots.step_s,
+        start_s=ready.start_s,
+        end_s=ready.end_s,
+        shift_s=row * float(theta[3]),
+        psi=theta[5:] if psi is not None else np.empty(0),
+        psi_first_s=psi.first_s if psi is not None else 0.0,
+        psi_knot_s=psi.step_s if psi is not None else 0.5,
+        amplitude_refused=refused,
+    )
+
+
+def _px_per_mm(ready: Prepared) -> float:
+    return float(ready.rig.left.K[0, 0] / ready.poses[0].t0_mm[2])

@@ -1,0 +1,47 @@
+"""What the blur of the exposure leaves of each harmonic."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olivevib.arrays import Floats
+from olivevib.reconstruction.motion.types import MotionSettings, Observations
+
+FREE = 0.05  # frequency x exposure up to which nothing is corrected (below 0.5 %)
+MOST = 0.25  # above which no amplitude is given
+
+
+def exposures(observations: Observations) -> tuple[float, float]:
+    """Median exposure of the left and right frames, s; 0 where unknown."""
+    out = []
+    for side in ("left", "right"):
+        all_s = np.concatenate([getattr(m, side).exposure_s for m in observations.markers])
+        known = all_s[np.isfinite(all_s)]
+        out.append(float(np.median(known)) if known.size else 0.0)
+    return out[0], out[1]
+
+
+def blur_gains(
+    observations: Observations, settings: MotionSettings, f_hz: float, amplitude_px: float
+) -> tuple[Floats, str]:
+    """Gains (2, H) of left and right, and why no amplitude may be given (empty: it may).
+
+    Up to f E = 0.05 the gain is 1; above it comes from ``settings.gain``, or is refused.
+    """
+    gain, why = np.ones((2, settings.harmonics)), ""
+    for side, exposure in enumerate(exposures(observations)):
+        for h in range(1, settings.harmonics + 1):
+            product = h * f_hz * exposure
+            if product <= FREE:
+                continue
+            known = None
+            if settings.gain is not None and product <= MOST:
+                known = settings.gain(h * f_hz, exposure, amplitude_px)
+            if known is not None:
+                gain[side, h - 1] = known[0]
+            elif h == 1:
+                why = (
+                    f"Frequency x exposure is {product:.2f}: the blur takes an unknown share of "
+                    "the amplitude. Use a shorter exposure."
+                )
+    return gain, why

@@ -1,0 +1,143 @@
+"""What the pixels say without any model of time: noise, apparent frequency, pace of the sway.
+
+Each coordinate of each corner is a sum of a spline and a sine on the frames' own times. An alias
+and its original fit alike, so nothing here favours a branch, a row time or an offset.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from olivevib.arrays import Floats
+from olivevib.reconstruction.motion.spline import knots_over
+from olivevib.reconstruction.motion.types import Observations, Sightings
+
+SPACINGS_S = (0.4, 0.3, 0.2, 0.15, 0.1)  # of knots, longest first
+RISE = 1.05  # of the noise variance that a longer spacing may cost
+SLOW_HZ = 2.7  # a line that appears slower is left to the spline when its spacing is chosen
+LEAST_FREE = 24  # degrees of freedom below which no noise is measured
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """knot_s chosen; f_hz (F,) apparent frequencies with power (F,) log evidence; noise: for each
+    view (markers x 2) the covariance (2P, 2P) px² of a frame and its degrees of freedom.
+    """
+
+    knot_s: float
+    f_hz: Floats
+    power: Floats
+    peaks_hz: tuple[float, ...]
+    noise: tuple[tuple[Floats, float], ...]
+    scale: float
+
+
+def views_of(observations: Observations) -> list[Sightings]:
+    """Left and right of each marker in turn."""
+    return [v for m in observations.markers for v in (m.left, m.right)]
+
+
+def look(observations: Observations, knot_s: float | None, harmonics: int) -> Pixels:
+    """Choose the knots, scan the apparent frequency, measure the noise."""
+    views = views_of(observations)
+    span = max(float(np.ptp(v.row_zero_s)) for v in views)
+    rate = observations.frame_rate_hz
+    f = np.arange(0.3 / span, rate / 2, 0.3 / span)
+    spacings = (knot_s,) if knot_s else tuple(s for s in SPACINGS_S if s >= 2.5 / rate)
+    trials = []
+    for step in spacings:
+        power, bases = _scan(views, step, f)
+        peaks = _peaks(f, power, 2.0 / span)
+        noise = tuple(_noise(v, Q, peaks, harmonics) for v, Q in zip(views, bases, strict=True))
+        trials.append((step, power, peaks, noise))
+    sizes = [_size(views, t[3]) for t in trials]
+    pick = next(k for k, s in enumerate(sizes) if s <= RISE * min(sizes))
+    step, power, peaks, noise = trials[pick]
+    return Pixels(step, f, power, peaks, noise, float(np.sqrt(sizes[pick])))
+
+
+def _scan(views: list[Sightings], step: float, f: Floats) -> tuple[Floats, list[Floats]]:
+    total, bases = np.zeros(f.size), []
+    for v in views:
+        t = v.row_zero_s
+        Q = np.linalg.qr(knots_over(t[0], t[-1], step).matrix(t))[0]
+        bases.append(Q)
+        y = v.px.reshape(t.size, -1)
+        W = np.linalg.inv(np.linalg.cholesky(v.covariance_px2.mean(axis=0)))
+        r = (y - Q @ (Q.T @ y)) @ W.T
+        total += line_power(t, Q, r, f)
+    return total, bases
+
+
+def line_power(t: Floats, Q: Floats, r: Floats, f: Floats) -> Floats:
+    """Half the drop of the squares of r (N, d) by a sine at each f, beside the spline Q."""
+    angle = 2 * np.pi * np.outer(t - t.mean(), f)
+    c, s = np.cos(angle), np.sin(angle)
+    qc, qs = Q.T @ c, Q.T @ s
+    cc = (c * c).sum(0) - (qc * qc).sum(0)
+    ss = (s * s).sum(0) - (qs * qs).sum(0)
+    cs = (c * s).sum(0) - (qc * qs).sum(0)
+    gc, gs = c.T @ r, s.T @ r
+    cc, ss = cc + 1e-3 * t.size, ss + 1e-3 * t.size
+    det = np.maximum(cc * ss - cs * cs, 1e-9 * cc * ss)
+    drop = ss[:, None] * gc**2 - 2 * cs[:, None] * gc * gs + cc[:, None] * gs**2
+    return np.asarray(0.5 * drop.sum(axis=1) / det)
+
+
+def _peaks(f: Floats, power: Floats, apart_hz: float, most: int = 2) -> tuple[float, ...]:
+    """The strongest maxima, best first, each with the vertex of its parabola."""
+    left = power.copy()
+    found: list[float] = []
+    for _ in range(most):
+        k = int(np.argmax(left))
+        if left[k] <= 0:
+            break
+        shift = 0.0
+        if 0 < k < f.size - 1:
+            a, b, c = power[k - 1 : k + 2]
+            bend = a - 2 * b + c
+            shift = float(np.clip(0.5 * (a - c) / bend, -0.5, 0.5)) if bend < 0 else 0.0
+        found.append(float(f[k] + shift * (f[1] - f[0])))
+        left[np.abs(f - f[k]) < apart_hz] = 0.0
+    return tuple(found)
+
+
+def _noise(
+    v: Sightings, Q: Floats, peaks: tuple[float, ...], harmonics: int
+) -> tuple[Floats, float]:
+    """Covariance of a frame's pixels left by spline and lines, blended with the localiser's."""
+    t, n = v.row_zero_s, v.row_zero_s.size
+    columns = [Q]
+    for f in peaks[:1] if peaks and peaks[0] > SLOW_HZ else ():
+        for h in range(1, harmonics + 1):
+            angle = 2 * np.pi * h * f * (t - t.mean())
+            columns.append(np.column_stack([np.cos(angle), np.sin(angle)]))
+    basis = np.linalg.qr(np.column_stack(columns))[0]
+    y = v.px.reshape(n, -1)
+    r = y - basis @ (basis.T @ y)
+    free = float(n - basis.shape[1])
+    own = v.covariance_px2.mean(axis=0)
+    if free < LEAST_FREE:
+        return own, 0.0
+    seen = r.T @ r / free
+    scale = float(np.trace(np.linalg.solve(own, seen)) / own.shape[0])
+    share = 12.0 / (12.0 + free)
+    return share * scale * own + (1 - share) * seen, free
+
+
+def _size(views: list[Sightings], noise: tuple[tuple[Floats, float], ...]) -> float:
+    """Mean noise variance over the localiser's."""
+    ratios = [
+        np.trace(np.linalg.solve(v.covariance_px2.mean(axis=0), c)) / c.shape[0]
+        for v, (c, _) in zip(views, noise, strict=True)
+    ]
+    return float(np.mean(ratios))
+
+
+def whitenings(view: Sightings, noise: Floats) -> Floats:
+    """(N, 2P, 2P) inverse roots of the measured covariance, larger where the localiser says so."""
+    trace = np.trace(view.covariance_px2, axis1=1, axis2=2)
+    factor = np.sqrt(trace / trace.mean())
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(noise))[None] / factor[:, None, None])
