@@ -1,4 +1,4 @@
-"""Verb rowtime: the time between two sensor rows, from a flashing lamp."""
+"""Verb rowtime: the time between two sensor rows, from a flashing lamp or a waved board."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ def row_time(arguments: argparse.Namespace, console: Console) -> int:
     from olivevib.trial.camera_book import remember, workspace_of
 
     video = Path(arguments.file)
+    if arguments.led is None:
+        return _from_board(arguments, console)
     measured = measure_row_time(video, arguments.led, arguments.camera, console.tick)
     print(measured.words)
     warned = console.cautions(measured.cautions)
@@ -28,3 +30,23 @@ def row_time(arguments: argparse.Namespace, console: Console) -> int:
     micro = measured.entry.row_time_us
     console.say(f"In a trial that exists: --set cameras.left.row_time_us={micro:g}")
     return 3 if warned else 0
+
+
+def _from_board(arguments: argparse.Namespace, console: Console) -> int:
+    """Tell the row times that the waved board of a trial's calibration showed, and keep them."""
+    from olivevib.pipeline.row_time import board_row_times
+    from olivevib.trial import Trial
+    from olivevib.trial.camera_book import remember, workspace_of
+    from olivevib.trial.workspace import find_trial
+
+    trial = Trial.open(find_trial(arguments.file, Path()))
+    workspace = workspace_of(trial.folder)
+    for measured in board_row_times(trial):
+        print(measured.words)
+        mode = measured.entry.mode
+        if not mode.camera or workspace is None or not mode.fps:
+            console.say(f"Not kept: nothing says whose camera, in which mode, {measured.side} is.")
+        else:
+            console.say(f"kept for {mode.camera} in {remember(workspace, measured.entry)}")
+    console.say(f"{trial.name} itself uses them already (rig.toml, row_time_source board).")
+    return 0

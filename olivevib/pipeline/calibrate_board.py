@@ -49,8 +49,13 @@ def _with_row_times(result: Calibration) -> StereoRig:
         (result.rig.left, result.rig.right), result.row_time_s, result.row_time_sigma_s, strict=True
     ):
         known = camera.row_time_source == "unknown" and sigma < BOARD_SHARE * abs(value)
-        told = {"row_time_s": float(value), "row_time_sigma_s": float(sigma)}
-        cameras.append(replace(camera, row_time_source="board", **told) if known else camera)
+        timed = replace(
+            camera,
+            row_time_s=float(value),
+            row_time_sigma_s=float(sigma),
+            row_time_source="board",
+        )
+        cameras.append(timed if known else camera)
     return replace(result.rig, left=cameras[0], right=cameras[1])
 
 

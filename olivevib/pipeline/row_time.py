@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from olivevib.calibration.row_time import RowTime, row_time_from_led
-from olivevib.errors import Caution, UsageError
+from olivevib.errors import Caution, InputError, UsageError
 from olivevib.files.video import Video
 from olivevib.pipeline.capture.record import RECORD
-from olivevib.pipeline.recordings import stamps_of
+from olivevib.pipeline.recordings import SIDES, stamps_of
 from olivevib.progress import Tick, silent
-from olivevib.trial.camera_book import CameraMode, Entry
+from olivevib.trial import Trial
+from olivevib.trial.camera_book import BOARD, CameraMode, Entry
 
 MOST_FRAMES = 600
 
@@ -77,6 +78,52 @@ def measure_row_time(
     found = row_time_from_led(np.array(profiles), fit.t_s[kept], led_hz)
     mode = CameraMode(camera or recorded_camera(video) or "", size, round(fit.rate_hz, 3))
     return MeasuredRowTime(found, mode, led_hz, _cautions(found))
+
+
+@dataclass(frozen=True)
+class BoardRowTime:
+    """The row time of one camera of a trial as its waved board showed it."""
+
+    side: str
+    entry: Entry
+
+    @property
+    def words(self) -> str:
+        """For a person."""
+        rows, micro = self.entry.mode.size_px[1], self.entry.row_time_us
+        way = "downward" if micro > 0 else "upward"
+        return (
+            f"{self.side}: row time {abs(micro):.3f} ± {self.entry.sigma_us:.3f} µs, readout "
+            f"{abs(micro) * rows / 1000:.2f} ms over {rows} rows, read {way} (waved board)"
+        )
+
+
+def board_row_times(trial: Trial) -> list[BoardRowTime]:
+    """Both cameras' row times from the board that was waved for a trial's calibration.
+
+    Raises InputError where the trial is not calibrated, or the board did not tell them.
+    """
+    rig = trial.rig
+    if rig is None:
+        raise trial.need("calibrate")
+    found = []
+    for side in SIDES:
+        camera = getattr(rig, side)
+        if camera.row_time_source == "board":
+            video = trial.path(str(getattr(trial.settings.calibration, side)))
+            rate = trial.tracks.cameras[side].rate_hz if trial.tracks else 0.0
+            own = getattr(trial.settings.cameras, side).video
+            name = recorded_camera(trial.path(own)) or recorded_camera(video) or ""
+            mode = CameraMode(name, camera.size_px, round(rate, 3))
+            micro = round(camera.row_time_s * 1e6, 4), round(camera.row_time_sigma_s * 1e6, 4)
+            found.append(BoardRowTime(side, Entry(mode, *micro, f"{BOARD} of {trial.name}")))
+    if not found:
+        raise InputError(
+            f"the calibration of {trial.name} tells no row time.",
+            "The board was not waved in a video, or not fast enough; or the row time was declared.",
+            "Wave the board for some seconds, tilting it; or use a lamp: olivevib rowtime --led HZ",
+        )
+    return found
 
 
 def recorded_camera(video: Path) -> str | None:

@@ -24,7 +24,6 @@ from olivevib.vibration import SamplingFacts, find_phases
 
 DECLARED_SHARE = 0.02  # sigma of a row time that was declared without one
 DECLARED_OFFSET_S = 5e-4  # sigma of an offset that was declared: typed, not measured
-BOARD_SHARE = 0.15  # a waved board that knows the row time no better tells none
 
 
 class RowTime(NamedTuple):

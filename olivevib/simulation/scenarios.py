@@ -159,14 +159,37 @@ SAMPLE = Scenario(
     sensor=Sensor(marker=2, rate_hz=500.0),
 )
 
+BEYOND_SHAKING = Shaking(25.0, Phases(1.5, 0.9, 8.3, 0.4), trunk_mm=3.0, harmonic=0.12, sway_mm=4.0)
 BEYOND = replace(
     DEMO,
     name="beyond",
     title="the same tree at 25 Hz: rolling shutters, cameras 9 ms apart, second harmonic",
-    what=Shaking(25.0, Phases(1.5, 0.9, 8.3, 0.4), trunk_mm=3.0, harmonic=0.12, sway_mm=4.0),
+    what=BEYOND_SHAKING,
     band_hz=(5.0, 45.0),
     board=BoardPlan(views=30, video_fps=None),
     cameras=CameraPlan(right=Clock(offset_s=0.009, drift_ppm=12.0), row_time_s=(27.8e-6, 26.9e-6)),
+)
+
+IN_STEP = replace(
+    BEYOND,
+    name="beyond-in-step",
+    title="the same at 25 Hz, global shutters, cameras in step: nothing can tell the frequency",
+    cameras=CameraPlan(),
+)
+
+NEAR_THE_RATE = replace(
+    BEYOND,
+    name="beyond-blind",
+    title="the same at 28.6 Hz, rolling shutters, cameras in step: it looks like sway",
+    what=replace(BEYOND_SHAKING, f_hz=28.6),
+    cameras=CameraPlan(row_time_s=(27.8e-6, 26.9e-6)),
+)
+
+WAVED = replace(
+    BEYOND,
+    name="beyond-waved",
+    title="the same at 25 Hz, 9 ms apart, board waved in a video: it tells the row times",
+    board=BoardPlan(views=150, video_fps=30.0),
 )
 
 RELEASE = replace(
@@ -232,7 +255,8 @@ ROUGH = replace(
 )
 
 SCENARIOS: tuple[Scenario, ...] = (
-    *(DEMO, BEYOND, SAMPLE, RELEASE, TOY_CARS, STILL, DAPPLED, LEAVES, ROUGH),
+    *(DEMO, BEYOND, IN_STEP, NEAR_THE_RATE, WAVED, SAMPLE),
+    *(RELEASE, TOY_CARS, STILL, DAPPLED, LEAVES, ROUGH),
 )
 
 

@@ -16,6 +16,7 @@ from olivevib.errors import InputError
 from olivevib.files.atomic import write_text_atomic
 
 FILE = "cameras.toml"
+BOARD = "waved board"  # how the source of such an entry begins
 SAME_FPS = 0.02  # a share: nominal and true rate of one mode differ by less
 
 
@@ -41,6 +42,11 @@ class Entry:
     row_time_us: float
     sigma_us: float
     source: str
+
+    @property
+    def kind(self) -> str:
+        """What measured it, as trial.toml says it: "led" or "board"."""
+        return "board" if self.source.startswith(BOARD) else "led"
 
 
 def workspace_of(folder: Path) -> Path | None:

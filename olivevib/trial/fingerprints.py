@@ -70,7 +70,11 @@ def _track(folder: Path, settings: TrialSettings) -> dict[str, Path]:
 
 def _reconstruct(folder: Path, settings: TrialSettings) -> dict[str, Path]:
     names = ("tracks.h5", RIG, "calibration.h5")
-    return {name: folder / name for name in names}
+    files = {name: folder / name for name in names}
+    chosen = settings.reconstruction
+    if chosen.frame == "gravity" and chosen.plumb is None:
+        files |= {a.file: resolve(folder, a.file) for a in settings.accelerometers}
+    return files
 
 
 def _trajectory(folder: Path, settings: TrialSettings) -> dict[str, Path]:
@@ -94,7 +98,7 @@ def _settings(settings: TrialSettings, stage: Stage) -> dict[str, Any]:
     cameras = {
         f"cameras.{side}.{key}": whole["cameras"][side][key]
         for side in ("left", "right")
-        for key in ("row_time_us", "row_time_sigma_us", "exposure_ms")
+        for key in ("row_time_us", "row_time_sigma_us", "row_time_source", "exposure_ms")
     } | {"cameras.shutter": whole["cameras"]["shutter"]}
     markers = whole["markers"]
     sizes = {m["id"]: m["size_mm"] for m in markers["marker"] if m["size_mm"]}

@@ -89,6 +89,7 @@ def _camera_facts(folder: Path) -> dict[str, object]:
             out["cameras.shutter"] = "rolling"
             out[f"cameras.{side}.row_time_us"] = entry.row_time_us
             out[f"cameras.{side}.row_time_sigma_us"] = entry.sigma_us
+            out[f"cameras.{side}.row_time_source"] = entry.kind
         exposure = _exposure_ms(folder / f"{side}.nut")
         if exposure is not None:
             out[f"cameras.{side}.exposure_ms"] = exposure
