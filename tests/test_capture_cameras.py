@@ -13,7 +13,6 @@ import time
 
 import av
 import pytest
-from capture_cameras import MjpegServer, Plan, jpeg, number_of, numbered
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_videos import make_video
@@ -26,6 +25,7 @@ from olivevib.files.capture.clock import StampClock
 from olivevib.files.capture.device import open_options
 from olivevib.files.capture.jpeg import JpegSplitter
 from olivevib.files.capture.listing import modes_in
+from olivevib.studies.capture.camera import MjpegServer, Plan, jpeg, number_of, numbered
 
 
 def take(camera, count):

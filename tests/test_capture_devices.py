@@ -7,12 +7,12 @@ import threading
 from dataclasses import replace
 
 import pytest
-from capture_cameras import MjpegServer, Plan
 
 from olivevib.files.capture import Listed, Mode, open_camera
 from olivevib.files.capture.v4l2 import CameraMode
 from olivevib.pipeline import machine
 from olivevib.pipeline.capture import devices
+from olivevib.studies.capture.camera import MjpegServer, Plan
 
 MODES = (
     CameraMode("YUYV", (640, 480), (30.0,)),

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 from boards_simulated import grid
-from capture_cameras import jpeg
 from rendered_markers import Canvas, Look
 from small_videos import make_video
 
@@ -32,6 +31,7 @@ from olivevib.pipeline.capture.looks import grey_of_shot, look_at
 from olivevib.pipeline.capture.prompts import MotionSense
 from olivevib.pipeline.capture.verdict import camera_offset_s, judge_board
 from olivevib.signals import fit_stamps
+from olivevib.studies.capture.camera import jpeg
 
 LIBRARY = load_library("olive49")
 

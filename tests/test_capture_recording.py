@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from capture_cameras import jpeg, number_of, numbered
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -31,6 +30,7 @@ from olivevib.files.container import open_container
 from olivevib.files.packets import Packets, scan_video
 from olivevib.files.stamps import read_stamp_file
 from olivevib.files.video import Video
+from olivevib.studies.capture.camera import jpeg, number_of, numbered
 
 FACTS = CameraFacts("test", "test", "S1", "http", "mjpeg", "", (128, 96), 30.0, "header")
 PICTURES = [jpeg(seed=k) for k in range(3)]

@@ -9,7 +9,6 @@ import threading
 import time
 
 import pytest
-from capture_cameras import MjpegServer, Plan, jpeg, number_of
 
 from olivevib.cli import main
 from olivevib.errors import InputError, UsageError
@@ -19,6 +18,7 @@ from olivevib.files.packets import Packets, scan_video
 from olivevib.pipeline.capture import CapturePlan, capture, place_of, trial_from
 from olivevib.pipeline.capture import session as session_room
 from olivevib.progress import Cancelled
+from olivevib.studies.capture.camera import MjpegServer, Plan, jpeg, number_of
 from olivevib.trial import Trial
 
 FAST = Plan(fps=100)

@@ -7,13 +7,13 @@ import shutil
 import cv2
 import numpy as np
 import pytest
-from capture_cameras import MjpegServer, Plan
 from test_calibration_row_time import HEIGHT, profiles
 
 from olivevib.cli import main
 from olivevib.errors import InputError, UsageError
 from olivevib.files.capture import CameraFacts, Controls, Recording, Shot
 from olivevib.pipeline.row_time import measure_row_time
+from olivevib.studies.capture.camera import MjpegServer, Plan
 from olivevib.trial import Trial
 from olivevib.trial.camera_book import CameraMode, Entry, read_book, recall, remember
 

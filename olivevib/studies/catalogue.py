@@ -33,9 +33,14 @@ class Entry:
 
 PAPER: tuple[Entry, ...] = (
     Entry("6.1", "729 runs of the extraction, efficiency over the angle of view", "factorial:run"),
+    Entry("6.2", "calibration: Tab. 2, Fig. 15, Fig. 16", "calibration.paper_table:run"),
     Entry("6.3", "two toy cars on closed tracks, in step and 2 ms apart", "toy_cars:run"),
 )
 BENCHMARKS: tuple[Entry, ...] = (
+    Entry("capture", "what the recorder loses, and what its checksums find", "capture.study:run"),
+    Entry("calibration", "accuracy and time beside cv2", "calibration.peer:run"),
+    Entry("calibration-centres", "centres of coded markers", "calibration.centres:run"),
+    Entry("calibration-webcams", "four webcams: unused frames, latency", "calibration.webcams:run"),
     Entry("detection", "all of the detection-… studies", "detection.everything:run"),
     Entry("detection-rates", "markers found by size and tilt, beside peers", "detection.rates:run"),
     Entry("detection-accuracy", "centres against bound and peers", "detection.accuracy:run"),

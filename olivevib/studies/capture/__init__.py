@@ -1,0 +1,1 @@
+"""Measuring the recorder: cameras, long runs, kills, damage, a lamp."""
