@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,7 +38,9 @@ from olivevib.reconstruction.motion.types import (
     MotionSettings,
     Observations,
 )
-from olivevib.reconstruction.motion.wander import follow_speed
+from olivevib.reconstruction.motion.wander import pace_of, weigh_paces
+
+WORSE = 1.3  # noise or chi2 above which a wandering speed is looked for
 
 
 @dataclass(frozen=True)
@@ -77,21 +80,29 @@ def fit_motion(
     weighed = br.weigh(ready.model, candidates, sigma, tick)
     model, best = refine(ready, ready.model, weighed.branches[0])
     kind, fast = "steady", 0.0
-    if chi2_of(model, best) > 1.3:
-        followed = follow_speed(ready.model, observations, band_of(ready), tick)
-        if followed is not None:
-            other, moved = refine(ready, followed[0], followed[1].branches[0])
-            if chi2_of(other, moved) < 0.8 * chi2_of(model, best):
-                kind, model, best, weighed = "wandering", other, moved, followed[1]
-            fast = followed[2].fastest_hz_s
+    if chi2_of(model, best) > WORSE or ready.pixels.scale > WORSE:
+        knot = ready.pixels.knot_s
+        pace = pace_of(observations, knot, (ready.start_s, ready.end_s), ready.pixels.peaks_hz[0])
+        if pace is not None and pace.gain > WORSE:
+            fast = pace.ridge.fastest_hz_s
+            again = prepare(observations, rig, clock, settings, pace.phase)
+            rate = observations.frame_rate_hz
+            followed = weigh_paces(again.model, pace, rate, band_of(ready), tick)
+            if followed is not None:
+                ready, kind, weighed = again, "wandering", followed[1]
+                model, best = refine(ready, followed[0], weighed.branches[0])
     return finished(ready, (model, best), weighed, kind, fast)
 
 
 def prepare(
-    observations: Observations, rig: StereoRig, anchor: Anchor, settings: MotionSettings
+    observations: Observations,
+    rig: StereoRig,
+    anchor: Anchor,
+    settings: MotionSettings,
+    phase: Callable[[Floats], Floats] | None = None,
 ) -> Prepared:
-    """Pixels, poses and the linear problem about the sway."""
-    pixels = look(observations, settings.knot_s, settings.harmonics)
+    """Pixels, poses and the linear problem about the sway; phase: of a wandering line."""
+    pixels = look(observations, settings.knot_s, settings.harmonics, phase)
     clock, knots, start, end = layout(observations, anchor, settings, pixels.knot_s)
     poses, problems, whites = about_sway(
         observations, rig, pixels, clock, knots, sway_precision(settings)

@@ -6,6 +6,7 @@ and its original fit alike, so nothing here favours a branch, a row time or an o
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,8 +40,16 @@ def views_of(observations: Observations) -> list[Sightings]:
     return [v for m in observations.markers for v in (m.left, m.right)]
 
 
-def look(observations: Observations, knot_s: float | None, harmonics: int) -> Pixels:
-    """Choose the knots, scan the apparent frequency, measure the noise."""
+def look(
+    observations: Observations,
+    knot_s: float | None,
+    harmonics: int,
+    phase: Callable[[Floats], Floats] | None = None,
+) -> Pixels:
+    """Choose the knots, scan the apparent frequency, measure the noise.
+
+    phase: of a line whose speed wanders, else the strongest steady line is taken out.
+    """
     views = views_of(observations)
     span = max(float(np.ptp(v.row_zero_s)) for v in views)
     rate = observations.frame_rate_hz
@@ -50,7 +59,10 @@ def look(observations: Observations, knot_s: float | None, harmonics: int) -> Pi
     for step in spacings:
         power, bases = _scan(views, step, f)
         peaks = _peaks(f, power, 2.0 / span)
-        noise = tuple(_noise(v, Q, peaks, harmonics) for v, Q in zip(views, bases, strict=True))
+        noise = tuple(
+            _noise(v, Q, _phase(v, peaks, phase), harmonics)
+            for v, Q in zip(views, bases, strict=True)
+        )
         trials.append((step, power, peaks, noise))
     sizes = [_size(views, t[3]) for t in trials]
     pick = next(k for k, s in enumerate(sizes) if s <= RISE * min(sizes))
@@ -104,16 +116,25 @@ def _peaks(f: Floats, power: Floats, apart_hz: float, most: int = 2) -> tuple[fl
     return tuple(found)
 
 
-def _noise(
-    v: Sightings, Q: Floats, peaks: tuple[float, ...], harmonics: int
-) -> tuple[Floats, float]:
+def _phase(
+    v: Sightings, peaks: tuple[float, ...], phase: Callable[[Floats], Floats] | None
+) -> Floats | None:
+    """Apparent phase of the line in a view; None: too slow to be told from sway."""
+    t = v.row_zero_s
+    if phase is not None:
+        return phase(t)
+    if not peaks or peaks[0] < SLOW_HZ:
+        return None
+    return np.asarray(2 * np.pi * peaks[0] * (t - t.mean()))
+
+
+def _noise(v: Sightings, Q: Floats, phase: Floats | None, harmonics: int) -> tuple[Floats, float]:
     """Covariance of a frame's pixels left by spline and lines, blended with the localiser's."""
-    t, n = v.row_zero_s, v.row_zero_s.size
+    n = v.row_zero_s.size
     columns = [Q]
-    for f in peaks[:1] if peaks and peaks[0] > SLOW_HZ else ():
+    if phase is not None:
         for h in range(1, harmonics + 1):
-            angle = 2 * np.pi * h * f * (t - t.mean())
-            columns.append(np.column_stack([np.cos(angle), np.sin(angle)]))
+            columns.append(np.column_stack([np.cos(h * phase), np.sin(h * phase)]))
     basis = np.linalg.qr(np.column_stack(columns))[0]
     y = v.px.reshape(n, -1)
     r = y - basis @ (basis.T @ y)

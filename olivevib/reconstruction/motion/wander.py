@@ -19,7 +19,7 @@ from olivevib.reconstruction.motion.branches import (
 from olivevib.reconstruction.motion.pixels import SLOW_HZ, line_power, views_of
 from olivevib.reconstruction.motion.solve import SHARED, Model, settle
 from olivevib.reconstruction.motion.spline import Knots, knots_over
-from olivevib.reconstruction.motion.types import Observations
+from olivevib.reconstruction.motion.types import Observations, Sightings
 
 WINDOW_S = 1.0
 HOP_S = 0.25
@@ -28,6 +28,7 @@ STEP_SIGMA_HZ = 0.4  # change of the apparent frequency from window to window
 TEMPER = 60.0  # largest drop of log evidence that a window may claim
 PSI_KNOT_S = 0.5
 PSI_SIGMA_RAD = 2.0
+POLISH_STEPS = 25
 GAUGE_RAD = 1e-3  # mean and slope of the phase belong to amplitudes and frequency
 
 
@@ -127,34 +128,124 @@ def with_phase(model: Model, psi: Knots, bend: Floats, span: tuple[float, float]
     return replace(model, theta0=theta0, precision=precision, active=active, psi=psi)
 
 
-def follow_speed(
-    model: Model, observations: Observations, band_hz: tuple[float, float], tick: Tick
-) -> tuple[Model, Weighed, Ridge] | None:
-    """Branches with a wandering phase, best first; None where no ridge can be followed.
+@dataclass(frozen=True)
+class Pace:
+    """The apparent phase 2 pi f_hz (t - mid_s) + psi(t) of a machine whose speed wanders.
 
-    The returned model has the phase of the best branch as its expectation.
+    gain: noise variance that a steady line leaves over what this phase leaves.
     """
-    ridge = ridge_of(observations, model.knots.step_s)
+
+    f_hz: float
+    psi: Knots
+    bend: Floats
+    mid_s: float
+    span: tuple[float, float]
+    ridge: Ridge
+    gain: float
+
+    def phase(self, t_s: Floats) -> Floats:
+        """Apparent phase, rad."""
+        bend = self.psi.values(self.bend[:, None], t_s)[..., 0]
+        return np.asarray(2 * np.pi * self.f_hz * (t_s - self.mid_s) + bend)
+
+
+def pace_of(
+    observations: Observations, knot_s: float, span: tuple[float, float], steady_hz: float
+) -> Pace | None:
+    """Follow the apparent speed by its ridge, then fit its phase to the pixels (no branch yet)."""
+    ridge = ridge_of(observations, knot_s)
     if ridge is None:
         return None
-    knots = model.knots
-    start, end = knots.first_s, knots.first_s + knots.step_s * (knots.count - 5)
-    psi = knots_over(start, end, PSI_KNOT_S)
-    apparent, bend = start_phase(ridge, psi, start, end)
-    rate = observations.frame_rate_hz
-    found = merged(families((apparent,), rate, band_hz), 0.3 / (end - start))
+    psi = knots_over(*span, PSI_KNOT_S)
+    f, bend = start_phase(ridge, psi, *span)
+    mid = 0.5 * (span[0] + span[1])
+    lines = [PixelLine.of(v, knot_s) for v in views_of(observations)]
+    prior = psi_precision(psi, *span)
+    start = bend
+    for _ in range(POLISH_STEPS):
+        G, g = prior.copy(), prior @ (start - bend)
+        H = np.zeros((psi.count + 1, psi.count + 1))
+        h = np.zeros(psi.count + 1)
+        for line in lines:
+            phase = 2 * np.pi * f * (line.t_s - mid) + psi.values(bend[:, None], line.t_s)[:, 0]
+            by_phase = np.column_stack([2 * np.pi * (line.t_s - mid), psi.matrix(line.t_s)])
+            part, score = line.normal(phase, by_phase)
+            H, h = H + part, h + score
+        H[1:, 1:] += G
+        h[1:] += g
+        move = np.linalg.solve(H + 1e-9 * np.diag(np.diag(H)), h)
+        size = float(np.abs(psi.matrix(lines[0].t_s) @ move[1:]).max())
+        move *= min(1.0, 0.6 / max(size, 1e-12))
+        f, bend = f + float(move[0]), bend + move[1:]
+        if size < 1e-3:
+            break
+    left = sum(
+        x.left_over(2 * np.pi * f * (x.t_s - mid) + psi.values(bend[:, None], x.t_s)[:, 0])
+        for x in lines
+    )
+    steady = sum(x.left_over(2 * np.pi * steady_hz * (x.t_s - mid)) for x in lines)
+    return Pace(f, psi, bend, mid, span, ridge, steady / max(left, 1e-12))
+
+
+@dataclass(frozen=True)
+class PixelLine:
+    """One view's whitened pixels with the spline taken out, for any phase of a line in them."""
+
+    t_s: Floats
+    Q: Floats
+    r: Floats
+
+    @classmethod
+    def of(cls, view: Sightings, knot_s: float) -> PixelLine:
+        """From one camera's sightings of one marker."""
+        t = view.row_zero_s
+        Q = np.linalg.qr(knots_over(t[0], t[-1], knot_s).matrix(t))[0]
+        W = np.linalg.inv(np.linalg.cholesky(view.covariance_px2.mean(axis=0)))
+        y = view.px.reshape(t.size, -1)
+        return cls(t, Q, np.asarray((y - Q @ (Q.T @ y)) @ W.T))
+
+    def _fit(self, phase: Floats) -> tuple[Floats, Floats, Floats]:
+        X = np.column_stack([np.cos(phase), np.sin(phase), np.cos(2 * phase), np.sin(2 * phase)])
+        X = X - self.Q @ (self.Q.T @ X)
+        c = np.linalg.lstsq(X, self.r, rcond=None)[0]
+        return X, c, self.r - X @ c
+
+    def left_over(self, phase: Floats) -> float:
+        """Squares that a line of this phase and its double leave."""
+        return float(np.sum(self._fit(phase)[2] ** 2))
+
+    def normal(self, phase: Floats, by_phase: Floats) -> tuple[Floats, Floats]:
+        """Normal matrix and score of the phase's parameters, amplitudes eliminated."""
+        X, c, rest = self._fit(phase)
+        slope = -np.sin(phase)[:, None] * c[0] + np.cos(phase)[:, None] * c[1]
+        basis = np.column_stack([np.linalg.qr(X)[0], self.Q])
+        q, d = by_phase.shape[1], self.r.shape[1]
+        H, h = np.zeros((q, q)), np.zeros(q)
+        noise = float(np.sum(rest**2)) / max(1.0, rest.size - basis.shape[1] * d)
+        for k in range(d):
+            J = slope[:, k, None] * by_phase
+            J = J - basis @ (basis.T @ J)
+            H, h = H + J.T @ J / noise, h + J.T @ rest[:, k] / noise
+        return H, h
+
+
+def weigh_paces(
+    model: Model, pace: Pace, rate_hz: float, band_hz: tuple[float, float], tick: Tick
+) -> tuple[Model, Weighed] | None:
+    """Branches with the wandering phase, best first, and the model of the best."""
     fitted, models = [], {}
+    found = merged(families((pace.f_hz,), rate_hz, band_hz), 0.3 / (pace.span[1] - pace.span[0]))
     for k, f in enumerate(found):
         tick(k, found.size, f"{f:.2f} Hz, speed wandering")
-        h = 1 if abs(abs(f - rate * round(f / rate)) - apparent) < 0.1 else 2
-        sign = 1.0 if h * f >= rate * round(h * f / rate) else -1.0
-        trial = with_phase(model, psi, sign * bend / h, (start, end))
+        h = 1 if abs(abs(f - rate_hz * round(f / rate_hz)) - pace.f_hz) < 0.05 else 2
+        sign = 1.0 if h * f >= rate_hz * round(h * f / rate_hz) else -1.0
+        trial = with_phase(model, pace.psi, sign * pace.bend / h, pace.span)
         theta = trial.theta0.copy()
         theta[0] = f
-        branch = settle(trial, theta, 15)
+        branch = settle(trial, theta, 6)
         fitted.append(branch)
         models[id(branch)] = trial
     if not fitted:
         return None
     weighed = prefer_double(distinct(fitted, 0.05), NEAR_BEST, 0.02)
-    return models[id(weighed.branches[0])], weighed, ridge
+    return models[id(weighed.branches[0])], weighed
