@@ -21,8 +21,10 @@ from olivevib.vibration import (
     LineStatus,
     MarkerMotion,
     Phase,
+    SamplingFacts,
     Spectrum,
     Vibration,
+    survey,
 )
 from olivevib.vibration.figures import NO_LINE, figures, unknown
 
@@ -68,7 +70,9 @@ def trajectory(ids: list[int], seconds: float = 10.0, f_hz: float = 12.003) -> T
     for k in range(3):
         wave = size[k] * np.cos(2 * np.pi * f_hz * seen_t + 0.7 * k + 0.4 * np.arange(m))
         sway = 0.6 * np.sin(2 * np.pi * 0.7 * seen_t + k)
-        xyz[:, :, k] = start[:, k] + ramp * wave + sway
+        since = np.clip(seen_t - (seconds - 0.83), 0, None)
+        free = size[k] * np.exp(-2.4 * since) * np.sin(2 * np.pi * 4.0 * since)
+        xyz[:, :, k] = start[:, k] + ramp * wave + sway + free
     sigma = np.broadcast_to([0.05, 0.05, 0.31], (n, m, 3)) * rng.uniform(0.8, 1.5, (n, m, 1))
     xyz = xyz + sigma * rng.standard_normal((n, m, 3))
     if ids[-1] == 17:
@@ -190,7 +194,10 @@ def vibration(path: Trajectory, spectra: Spectrum) -> Vibration:
             ("acceleration", "m/s2", spectra.amplitude * factor),
         )
     }
-    return Vibration(phases, {"displacement": spectra} | rates, tuple(table), "steady")
+    motion = {int(i): path.samples(int(i)) for i in path.ids}
+    lines = {int(i): each for i, each in zip(path.ids, spectra.lines, strict=True)}
+    told = survey(motion, {}, lines, phases, phases[2], SamplingFacts(30.0, band_hz=(5.0, 14.0)))
+    return Vibration(phases, {"displacement": spectra} | rates, tuple(table), "steady", survey=told)
 
 
 def comparison() -> Comparison:

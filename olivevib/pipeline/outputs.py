@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from olivevib.files.exports import ExportFacts
 from olivevib.files.exports import export as write_export
 from olivevib.progress import Tick, silent
 from olivevib.trial import Trial
+
+if TYPE_CHECKING:
+    from olivevib.report import Also
 
 
 def export_place(trial: Trial, to: str) -> Path:
@@ -28,21 +31,30 @@ def export(
     write_export(trajectory, to, target, facts, ids)
 
 
-def report(trials: Sequence[Trial], folder: str | None, tick: Tick = silent) -> Iterator[Path]:
+def report(
+    trials: Sequence[Trial],
+    folder: str | None,
+    tick: Tick = silent,
+    also: Also | None = None,
+    pages: bool = True,
+) -> Iterator[Path]:
     """Write one page a trial (report.html in its folder, or NAME.html in ``folder``).
 
-    Several trials also give a season page, season.html in ``folder`` or in the current folder.
+    Several trials also give a season page, season.html in ``folder`` or in the current folder, with
+    its table season.csv. pages False: the season alone, with links to the pages that are there.
+    also: PDF, figures as files, Parquet. Yields each file as it is written.
     """
-    from olivevib.report import write_season_report, write_trial_report
+    from olivevib.report import Also, write_season_report, write_trial_report
 
-    pages = []
+    also = also or Also()
+    named: list[tuple[Trial, Path | None]] = []
     for trial in trials:
         page = Path(folder) / f"{trial.name}.html" if folder else trial.folder / "report.html"
-        page.parent.mkdir(parents=True, exist_ok=True)
-        write_trial_report(trial, page, tick)
-        pages.append(page)
-        yield page
-    if len(trials) > 1:
+        if pages:
+            page.parent.mkdir(parents=True, exist_ok=True)
+            yield from write_trial_report(trial, page, tick, also)
+        named.append((trial, page if page.exists() else None))
+    if len(trials) > 1 or not pages:
         season = Path(folder or ".") / "season.html"
-        write_season_report(list(zip(trials, pages, strict=True)), season, tick)
-        yield season
+        season.parent.mkdir(parents=True, exist_ok=True)
+        yield from write_season_report(named, season, tick, also)

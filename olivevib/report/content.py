@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from olivevib.comparison import Comparison
@@ -11,9 +12,12 @@ from olivevib.errors import Caution
 from olivevib.geometry import StereoRig
 from olivevib.reconstruction.trajectory import Trajectory
 from olivevib.report.clean import clean
+from olivevib.report.decay import FreeDecay, free_decays
+from olivevib.report.transfer import Transmissibility, surveyed
+from olivevib.signals import fit_stamps
 from olivevib.tracking import Track
 from olivevib.trial.records.calibration import CalibrationRecord
-from olivevib.vibration import Line, Phase, Spectrum, Vibration
+from olivevib.vibration import Line, Phase, Spectrum, Survey, Vibration
 
 
 @dataclass(frozen=True)
@@ -71,3 +75,41 @@ class ReportContent:
         if spectrum is None:
             return {}
         return {int(i): line for i, line in zip(spectrum.ids, spectrum.lines, strict=True)}
+
+    @property
+    def continuous(self) -> bool:
+        """Whether the paths are those of a fitted motion, finer than the frames."""
+        return self.trajectory is not None and self.trajectory.method == "continuous"
+
+    @property
+    def frames(self) -> int:
+        """How many pictures the left camera delivered; instants of the paths where unknown."""
+        told = self.recordings.get("left", {}).get("frames")
+        if isinstance(told, int) and self.continuous:
+            return told
+        return 0 if self.trajectory is None else int(self.trajectory.t_s.size)
+
+    @property
+    def half_rate_hz(self) -> float:
+        """Where spectra fold: half the frame rate, or the end of a fitted motion's axis."""
+        path, spectrum = self.trajectory, self.displacement
+        if self.continuous and spectrum is not None and spectrum.f_hz.size:
+            return float(spectrum.f_hz[-1])
+        if path is not None and path.t_s.size > 1:
+            return fit_stamps(path.t_s).rate_hz / 2
+        return float(spectrum.f_hz[-1]) if spectrum is not None else float("nan")
+
+    @property
+    def survey(self) -> Survey | None:
+        """Orbits, decays, transmissibility, deflection shape; None before analyse."""
+        return None if self.vibration is None else self.vibration.survey
+
+    @cached_property
+    def transmissibility(self) -> Transmissibility | None:
+        """Every marker's dominant line against that of the reference; None where none shares it."""
+        return surveyed(self.survey)
+
+    @cached_property
+    def decays(self) -> tuple[FreeDecay, ...]:
+        """The free decays that the analysis found."""
+        return free_decays(self.survey, self.trajectory, self.phases)

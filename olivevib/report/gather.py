@@ -13,7 +13,9 @@ import olivevib
 from olivevib.errors import Caution
 from olivevib.files.store import read_header
 from olivevib.report.content import ReportContent
+from olivevib.report.figures.agreement import CommonLine
 from olivevib.report.season import SeasonEntry
+from olivevib.report.season_table import trial_rows
 from olivevib.trial.stages import STAGES
 from olivevib.trial.summary import summary
 
@@ -57,7 +59,17 @@ def entry_of(trial: Trial, link: str = "") -> SeasonEntry:
         places={m.id: m.place for m in trial.settings.markers.marker if m.place},
         simulated=trial.settings.session.simulated,
         link=link,
-    )
+        table=tuple(trial_rows(trial)),
+        sensor_lines=tuple(
+            CommonLine(
+                trial.name, x.f_hz, x.optical_m_s2, x.optical_sigma_m_s2, x.sensor_m_s2,
+                x.sensor_sigma_m_s2,
+            )
+            for c in trial.comparison
+            for x in c.lines
+            if x.optical_m_s2 > 0 and x.sensor_m_s2 > 0
+        ),
+    )  # fmt: skip
 
 
 def _recordings(trial: Trial) -> dict[str, dict[str, Any]]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import jinja2
 
@@ -30,6 +32,13 @@ class Section:
 LONG = 1500  # characters of a verdict or a reason
 MOST_DROPPED = 20  # dropped calibration views that are named
 MOST_PAIRS = 66  # distances listed as a table: 12 markers
+_WANTING = {  # of a section whose stage is done
+    "frequency": "no marker has a line whose frequency, or whose candidates, are known",
+    "spectrogram": "no marker was located long enough",
+    "transmissibility": "no marker shares its line with the reference (vibration.reference in"
+    " trial.toml, else a marker whose place is the trunk)",
+    "decay": "no free decay after the shaking was found that a damped sine explains",
+}
 SECTIONS = (
     Section("markers", "Markers", "reconstruct"),
     Section("paths", "Cameras, markers and paths", "calibrate"),
@@ -37,7 +46,10 @@ SECTIONS = (
     Section("frequency", "Frequency", "analyse"),
     Section("spectra", "Amplitude spectrum", "analyse"),
     Section("psd", "Power spectral density", "analyse"),
+    Section("spectrogram", "Spectrogram", "reconstruct"),
     Section("orbits", "Orbits", "reconstruct"),
+    Section("transmissibility", "Transmissibility", "analyse"),
+    Section("decay", "Free decay", "analyse"),
     Section("comparison", "Camera against accelerometer", "compare"),
     Section("distances", "Distances between markers", "reconstruct"),
     Section("seen", "When each marker was seen", "track"),
@@ -62,40 +74,57 @@ def environment() -> jinja2.Environment:
 
 def render_page(content: ReportContent, tick: Tick = silent) -> str:
     """One trial as an HTML document: inline style and figures, no script, no request anywhere."""
+    return render_facts(page_facts(content, tick))
+
+
+def render_facts(facts: Mapping[str, Any]) -> str:
+    """The HTML document of what ``page_facts`` gathered."""
+    return environment().get_template("trial.html.j2").render(**facts)
+
+
+def page_facts(content: ReportContent, tick: Tick = silent) -> dict[str, Any]:
+    """Everything that a page prints, as text and figures: the same for HTML and PDF."""
     drawn: dict[str, list[Plate]] = defaultdict(list)
     for plate in plates(content, tick):
         drawn[plate.section].append(plate)
     shown = [s for s in SECTIONS if not s.stage or _has(content, s, bool(drawn.get(s.name)))]
     statuses = {line.status for line in content.lines().values()}
-    template = environment().get_template("trial.html.j2")
-    return template.render(
-        name=clean(content.name),
-        simulated=content.simulated,
-        sections=shown,
-        missing=[(s.title, _why(content, s)) for s in SECTIONS if s not in shown],
-        plates=drawn,
-        verdict=verdict(content),
-        cautions=[
+    return {
+        "name": clean(content.name),
+        "simulated": content.simulated,
+        "sections": shown,
+        "missing": [(s.title, _why(content, s)) for s in SECTIONS if s not in shown],
+        "plates": drawn,
+        "verdict": verdict(content),
+        "cautions": [
             (clean(c.code, 60), clean(c.text, LONG), clean(c.remedy, LONG))
             for c in content.cautions
         ],
-        heading=_heading(content),
-        markers=tables.marker_rows(content),
-        meanings=[(str(s), words) for s, words in MEANING.items() if s in statuses],
-        reasons=_reasons(content),
-        record=tables.record_sections(content),
-        rig=tables.rig_pairs(content),
-        cameras=tables.camera_columns(content),
-        dropped_views=_dropped(content),
-        calibration_facts=tables.calibration_facts(content),
-        calibration_verdict=clean(content.calibration.verdict, LONG) if content.calibration else "",
-        timing=tables.timing_pairs(content),
-        clocks=tables.camera_clocks(content),
-        phase_rows=tables.phase_rows(content),
-        distances=_distances(content),
-        states=[s.word for s in State],
-        state_rows=tables.state_rows(content),
-        comparisons=[
+        "heading": _heading(content),
+        "markers": tables.marker_rows(content),
+        "meanings": [(str(s), words) for s, words in MEANING.items() if s in statuses],
+        "reasons": _reasons(content),
+        "record": tables.record_sections(content),
+        "rig": tables.rig_pairs(content),
+        "cameras": tables.camera_columns(content),
+        "dropped_views": _dropped(content),
+        "calibration_facts": tables.calibration_facts(content),
+        "calibration_verdict": clean(content.calibration.verdict, LONG)
+        if content.calibration
+        else "",
+        "timing": tables.timing_pairs(content),
+        "clocks": tables.camera_clocks(content),
+        "phase_rows": tables.phase_rows(content),
+        "figure_rows": tables.figure_rows(content),
+        "dose_rows": tables.dose_rows(content),
+        "orbit_rows": tables.orbit_rows(content),
+        "transmissibility_rows": tables.transmissibility_rows(content),
+        "decay_rows": tables.decay_rows(content),
+        "outcome": tables.outcome_pairs(content),
+        "distances": _distances(content),
+        "states": [s.word for s in State],
+        "state_rows": tables.state_rows(content),
+        "comparisons": [
             (
                 str(c.verdict),
                 clean(c.reason, LONG),
@@ -104,16 +133,21 @@ def render_page(content: ReportContent, tick: Tick = silent) -> str:
             )
             for c in content.comparisons
         ],
-        frame=clean(content.trajectory.frame) if content.trajectory else "",
-        phases=[
-            (clean(p.name, 30), f"{p.start_s:.2f} – {p.end_s:.2f}\u00a0s")
+        "frame": clean(content.trajectory.frame) if content.trajectory else "",
+        "phases": [
+            (tables.phase_word(content, p.name), f"{p.start_s:.2f} – {p.end_s:.2f}\u00a0s")
             for p in content.phases
             if p.name != "whole"
         ],
-        stages=tables.stage_rows(content),
-        command=clean(content.provenance.get("command", "")),
-        provenance=tables.provenance_pairs(content),
-    )
+        "stages": tables.stage_rows(content),
+        "command": clean(content.provenance.get("command", "")),
+        "provenance": tables.provenance_pairs(content),
+    }
+
+
+def _calibration_verdict(content: ReportContent) -> str:
+    """What the calibration says of itself in words."""
+    return clean(content.calibration.verdict, LONG) if content.calibration else ""
 
 
 def _heading(content: ReportContent) -> list[str]:
@@ -174,5 +208,7 @@ def _why(content: ReportContent, section: Section) -> str:
     stage = (content.summary.get("stages") or {}).get(section.stage) or {}
     state, reason = clean(stage.get("state") or ""), clean(stage.get("reason") or "")
     if not state or state == "done":
+        if section.name in _WANTING:
+            return _WANTING[section.name]
         return f"the stage {section.stage} found nothing to show"
     return f"the stage {section.stage} is {state}" + (f" ({reason})" if reason else "")

@@ -11,12 +11,13 @@ from olivevib.progress import Tick, silent
 from olivevib.report import figures
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
+from olivevib.report.lines import KNOWN, OPEN
 from olivevib.report.words import number
-from olivevib.signals import fit_stamps
 from olivevib.vibration import Spectrum
 
 ROWS = 8  # markers in one figure
 CLOSE_S = 1.0  # length of the close-up
+SPECTROGRAMS = 3  # markers whose spectrogram is drawn
 STRIPS = 36  # state strips in one figure
 
 
@@ -80,6 +81,7 @@ def _space(content: ReportContent) -> Iterator[_Job]:
             caption,
             _bound(figures.time_series, path, names, closest, window, (), lines),
         )
+    yield from _changing(content, ranked(content, ids))
     reach = figures.orbit_reach_mm(path, ids)
     for group in _groups(ids, figures.MOST_ACROSS):
         caption = _once(_ORBITS.format(reach=number(reach, 3)), group, ids)
@@ -100,44 +102,66 @@ def _bound(function: Callable[..., str], *values: object) -> Callable[[], str]:
 
 def _close(content: ReportContent, ids: Sequence[int]) -> tuple[figures.Window | None, list[int]]:
     """A second (or 15 frames) of the steady phase, and the three markers that move most."""
-    path, lines = content.trajectory, content.lines()
+    path = content.trajectory
     assert path is not None
     steady = [(span.start_s, span.end_s) for span in content.phases if span.name == "steady"]
     whole = figures.whole(path)
+    most = ranked(content, ids)[:3]
+    length_s = max(CLOSE_S, 7.5 / content.half_rate_hz)
+    span = steady[0] if steady else (whole.start_s, whole.end_s)
+    return figures.close_window(path, most[0], span, length_s), sorted(most)
+
+
+def ranked(content: ReportContent, ids: Sequence[int]) -> list[int]:
+    """The markers in order of their dominant line, the largest first; unknown ones by id last."""
+    lines = content.lines()
 
     def size(marker_id: int) -> float:
         line = lines.get(marker_id)
         total = 0.0 if line is None else float(np.sum(line.amplitude**2))
         return total if np.isfinite(total) else 0.0
 
-    ranked = sorted(ids, key=lambda i: -size(i))[:3]
-    length_s = max(CLOSE_S, 7.5 / half_rate_hz(content))
-    span = steady[0] if steady else (whole.start_s, whole.end_s)
-    return figures.close_window(path, ranked[0], span, length_s), sorted(ranked)
+    return sorted(ids, key=lambda i: -size(i))
 
 
-def half_rate_hz(content: ReportContent) -> float:
-    """Half the frame rate of the trial, where frequencies fold, Hz."""
-    path, spectrum = content.trajectory, content.displacement
-    if path is not None and path.t_s.size > 1:
-        return fit_stamps(path.t_s).rate_hz / 2
-    return float(spectrum.f_hz[-1]) if spectrum is not None else float("nan")
+def _changing(content: ReportContent, most: Sequence[int]) -> Iterator[_Job]:
+    """The spectrograms of the markers that move most."""
+    path, half, names = content.trajectory, content.half_rate_hz, content.names()
+    assert path is not None
+    each = {i: figures.spectrogram(path, i, half) for i in sorted(most[:SPECTROGRAMS])}
+    found = {i: one for i, one in each.items() if one is not None and np.isfinite(one.power).any()}
+    if found:
+        yield (
+            "spectrogram",
+            _SPECTROGRAM,
+            _bound(figures.spectrograms, found, names, content.phases),
+        )
 
 
 def _spectra(content: ReportContent) -> Iterator[_Job]:
-    spectrum, names, half = content.displacement, content.names(), half_rate_hz(content)
+    spectrum, names, half = content.displacement, content.names(), content.half_rate_hz
     if spectrum is None or not spectrum.ids.size:
         return
-    yield ("frequency", _FREQUENCY, lambda: figures.frequencies(spectrum, names, half))
+    if any(line.status in (*KNOWN, *OPEN) for line in spectrum.lines):
+        yield ("frequency", _FREQUENCY, lambda: figures.frequencies(spectrum, names, half))
+    ids = _finite_ids(spectrum)
+    for group in _groups(ids, ROWS):
+        words = _once(_AMPLITUDE + _window_words(spectrum, half), group, ids)
+        yield ("spectra", words, _bound(figures.amplitude_spectra, spectrum, names, group, half))
     acceleration = content.vibration.spectra.get("acceleration") if content.vibration else None
-    for each in [s for s in (spectrum, acceleration) if s is not None]:
-        for group in _groups(_finite_ids(each), ROWS):
-            words = _AMPLITUDE.format(of=each.quantity) + _window_words(each, half)
-            words = _once(words, group, _finite_ids(each))
-            yield ("spectra", words, _bound(figures.amplitude_spectra, each, names, group, half))
+    if acceleration is not None:
+        for group in _groups(_finite_ids(acceleration), 12):
+            job = _bound(figures.total_spectra, acceleration, names, group, half)
+            yield ("spectra", _ACCELERATION, job)
     for group in _groups(_finite_ids(spectrum), 12):
         job = _bound(figures.power_spectra, spectrum, names, group, half)
         yield ("psd", _PSD + _window_words(spectrum, half), job)
+    ratios = content.transmissibility
+    if ratios is not None:
+        job = _bound(figures.transmissibilities, ratios.ratios, names, ratios.reference)
+        yield ("transmissibility", _RATIOS, job)
+    if content.decays:
+        yield ("decay", _DECAY, _bound(figures.decays, content.decays, names))
 
 
 def _finite_ids(spectrum: Spectrum | None) -> list[int]:
@@ -154,7 +178,8 @@ def _window_words(s: Spectrum, half_hz: float) -> str:
     return (
         f" Phase: {clean(s.phase, 20)}{span}; {clean(s.window, 20).capitalize()} window,"
         f" {number(s.resolution_hz, 3)} Hz between bins, noise bandwidth"
-        f" {number(s.enbw_bins, 3)} bins; axis up to half the frame rate, {number(half_hz, 4)} Hz."
+        f" {number(s.enbw_bins, 3)} bins; axis up to {number(half_hz, 4)} Hz,"
+        " half the sampling rate."
     )
 
 
@@ -168,6 +193,9 @@ def _quality(content: ReportContent) -> Iterator[_Job]:
         yield ("seen", _SEEN, job)
     if path is not None and np.isfinite(path.sigma_xyz_mm).any():
         yield ("sigma", _SIGMA, lambda: figures.sigmas(path, names))
+        where = figures.sigma_map(rig, path) if rig is not None else None
+        if where is not None:
+            yield ("sigma", _SIGMA_MAP, _bound(figures.sigma_maps, where, path))
     if (
         view is not None
         and rig is not None
@@ -203,6 +231,27 @@ _ORBITS = (
     " Dots: single frames, evenly"
     " chosen in long records. Thick: the ellipse of the dominant line."
 )
+_SPECTROGRAM = (
+    "Displacement of the markers that move most, the powers of their axes added: the darker, the"
+    " stronger (dB below the strongest). Dashed: the strongest frequency of each second. Dotted"
+    " uprights: limits of the phases. Frequencies are as sampled: above half the frame rate they"
+    " fold."
+)
+_RATIOS = (
+    "How much of the reference marker's motion arrives at each marker: ratio of the amplitudes of"
+    " the dominant line in the same phase. Diamond: all axes together with one standard deviation;"
+    " open symbols: single axes. Holds whatever the true frequency is."
+)
+_DECAY = (
+    "Free decay of the markers that begin largest, along their axis of largest motion. Dots: single"
+    " frames; full: the fit, its three axes with one pole; dashed: its envelope. Frequencies are as"
+    " sampled."
+)
+_SIGMA_MAP = (
+    "Where this pair measures well, seen from above at the markers' median height: lines of equal"
+    " standard deviation of one position, for the image noise of this trial. Dots: the markers;"
+    " grey: not seen by both cameras."
+)
 _DISTANCES = (
     "Distances between markers. On one rigid body they should not change: what remains there is"
     " the error of the whole chain. Left: standard deviation of every pair, larger squares vary"
@@ -214,8 +263,12 @@ _FREQUENCY = (
     " half the frame rate."
 )
 _AMPLITUDE = (
-    "Amplitude spectrum (peak) of the {of}. Dashed: the dominant line as this frame rate shows it,"
-    " the triangle its fitted amplitude. Dotted: noise floor."
+    "Amplitude spectrum (peak) of the displacement. Dashed: the dominant line as this frame"
+    " rate shows it, the triangle its fitted amplitude. Dotted: noise floor."
+)
+_ACCELERATION = (
+    "Amplitude spectrum (peak) of the acceleration, the powers of the three axes added. Dashed: the"
+    " dominant line. Made as the spectrum above."
 )
 _PSD = (
     "Power spectral density of the displacement, the powers of the three axes added. Dashed: the"

@@ -9,7 +9,9 @@ from typing import Any
 
 from olivevib.progress import Tick, silent
 from olivevib.report.clean import clean
+from olivevib.report.figures.agreement import FEWEST, CommonLine, agreement, limits_of_agreement
 from olivevib.report.figures.boxes import boxes
+from olivevib.report.outliers import outliers
 from olivevib.report.page import environment
 from olivevib.report.plates import Plate
 from olivevib.report.words import NOT_KNOWN, count, known, measure
@@ -18,7 +20,10 @@ QUANTITIES = (
     ("displacement_pp_mm", "displacement, peak to peak, mm"),
     ("acceleration_rms_m_s2", "acceleration, rms of all axes, m/s²"),
     ("frequency_hz", "frequency of the dominant line where it is known, Hz"),
+    ("transmissibility_percent", "transmissibility from the trunk, %"),
+    ("removed_percent", "fruit removed, % (entered by hand)"),
 )
+OF_A_TRIAL = ("removed_percent",)  # one value a trial, not a marker
 SURE = ("direct", "confirmed")
 MOST_GROUPS = 30  # rows of one box plot
 
@@ -27,7 +32,9 @@ MOST_GROUPS = 30  # rows of one box plot
 class SeasonEntry:
     """What a season needs of one trial: its session record, its summary, places of markers.
 
-    link: address of the trial's own page relative to the season page; empty: none.
+    link: address of the trial's own page relative to the season page; empty: none. table: the
+    rows of the season's table (``season_table.trial_rows``). sensor_lines: what camera and
+    accelerometer both saw.
     """
 
     name: str
@@ -36,6 +43,8 @@ class SeasonEntry:
     places: Mapping[int, str] = field(default_factory=dict)
     simulated: bool = False
     link: str = ""
+    table: tuple[Mapping[str, Any], ...] = ()
+    sensor_lines: tuple[CommonLine, ...] = ()
 
     def typed(self, section: str, key: str) -> str:
         """A value of the session record as text; "not known" where nobody typed it."""
@@ -43,8 +52,18 @@ class SeasonEntry:
         return clean(value, 40) if value not in (None, "") else NOT_KNOWN
 
     def markers(self) -> list[Mapping[str, Any]]:
-        """The summary of each marker."""
-        return list(self.summary.get("markers") or [])
+        """The summary of each marker, with what the table knows beyond it."""
+        more = {row["marker"]: row for row in self.table if row["headline"]}
+        return [_beyond(m, more.get(m["id"])) for m in self.summary.get("markers") or []]
+
+
+def _beyond(marker: Mapping[str, Any], row: Mapping[str, Any] | None) -> Mapping[str, Any]:
+    if row is None:
+        return marker
+    ratio = row["transmissibility"]
+    percent = None if ratio is None else 100 * ratio
+    removed = row["removed_percent"]
+    return {**marker, "transmissibility_percent": percent, "removed_percent": removed}
 
 
 Factor = Callable[[SeasonEntry, int], str]
@@ -52,8 +71,15 @@ FACTORS: tuple[tuple[str, Factor], ...] = (
     ("marker place", lambda e, i: clean(e.places.get(i, ""), 40) or NOT_KNOWN),
     ("cultivar", lambda e, _: e.typed("tree", "cultivar")),
     ("machine", lambda e, _: e.typed("machine", "make")),
+    ("set frequency", lambda e, _: _set_hz(e)),
     ("trial", lambda e, _: clean(e.name, 40)),
 )
+
+
+def _set_hz(entry: SeasonEntry) -> str:
+    """The machine's set frequency as a group; equal lengths, so that names sort as numbers."""
+    value = (entry.record.get("machine") or {}).get("set_frequency_hz")
+    return f"{value:5.1f} Hz" if known(value) else NOT_KNOWN
 
 
 def render_season(entries: Sequence[SeasonEntry], tick: Tick = silent) -> str:
@@ -63,13 +89,29 @@ def render_season(entries: Sequence[SeasonEntry], tick: Tick = silent) -> str:
     for plate in season_plates(entries, tick):
         by_quantity[plate.section].append(plate)
     markers = sum(len(e.markers()) for e in entries)
+    lines = [line for e in entries for line in e.sensor_lines]
+    links = {clean(e.name, 60): clean(e.link) for e in entries}
     return template.render(
         name=f"{count(len(entries), 'trial')}, {count(markers, 'marker')}",
         rows=[season_row(e) for e in entries],
         plates=by_quantity,
+        agreement=agreement(lines) if lines else "",
+        agreement_words=_agreement_words(lines),
+        outliers=outliers(row for e in entries for row in e.table),
+        links=links,
         simulated=sum(e.simulated for e in entries),
         total=len(entries),
     )
+
+
+def _agreement_words(lines: Sequence[CommonLine]) -> str:
+    """What the figure of all trials says in a sentence."""
+    trials = len({line.trial for line in lines})
+    words = f"{count(len(lines), 'line')} of {count(trials, 'trial')}."
+    if len(lines) < FEWEST:
+        return words + " Limits of agreement need three lines."
+    middle, low, high = (measure(v, "%", digits=2) for v in limits_of_agreement(lines))
+    return words + f" Camera less sensor: {middle} on average, 95 % of lines from {low} to {high}."
 
 
 def season_row(entry: SeasonEntry) -> tuple[str, ...]:
@@ -108,14 +150,16 @@ def _moved(marker: Mapping[str, Any]) -> float:
 
 def season_plates(entries: Sequence[SeasonEntry], tick: Tick = silent) -> list[Plate]:
     """A box plot for each quantity and factor that splits the markers into two groups or more."""
-    jobs = [(q, f) for q in QUANTITIES for f in FACTORS]
+    jobs = [(q, f) for q in QUANTITIES for f in FACTORS
+            if not (q[0] in OF_A_TRIAL and f[0] in ("marker place", "trial"))]  # fmt: skip
     out = []
     for done, ((key, quantity), (factor, of)) in enumerate(jobs):
         tick(done, len(jobs), f"drawing: {quantity} by {factor}")
         groups = _groups(entries, key, of)
         if 1 < len(groups) <= MOST_GROUPS:
             svg = boxes(f"{key}-{factor.replace(' ', '')}", quantity, groups)
-            out.append(Plate(quantity, svg, f"By {factor}: one dot a marker and trial."))
+            each = "a trial" if key in OF_A_TRIAL else "a marker and trial"
+            out.append(Plate(quantity, svg, f"By {factor}: one dot {each}."))
     tick(len(jobs), len(jobs), "figures drawn")
     return out
 
@@ -124,7 +168,8 @@ def _groups(entries: Sequence[SeasonEntry], key: str, of: Factor) -> dict[str, l
     """Known values of one quantity by group; groups in order of their name."""
     found: dict[str, list[float]] = defaultdict(list)
     for entry in entries:
-        for marker in entry.markers():
+        markers = entry.markers()
+        for marker in markers[:1] if key in OF_A_TRIAL else markers:
             value = marker.get(key)
             sure = key != "frequency_hz" or marker.get("frequency_status") in SURE
             if sure and value is not None and known(value):

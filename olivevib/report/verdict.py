@@ -48,7 +48,7 @@ def _seen(content: ReportContent) -> str:
     were = "was" if found.sum() == 1 else "were"
     return (
         f"{count(int(found.sum()), 'marker')} {were} located in space over {span}"
-        f" ({count(path.t_s.size, 'frame')}), {often}; a position is known to {known}"
+        f" ({count(content.frames, 'frame')}), {often}; a position is known to {known}"
         f" ({AXES}, one standard deviation)."
     )
 

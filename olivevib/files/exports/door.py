@@ -28,6 +28,7 @@ _MODULES = {
     "c3d": "c3d",
     "trc": "trc",
     "mat": "mat",
+    "parquet": "parquet",
 }
 FORMATS: tuple[str, ...] = tuple(_MODULES)
 

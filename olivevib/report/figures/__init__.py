@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from olivevib.report.figures.boxes import boxes
+from olivevib.report.figures.decays import decays
 from olivevib.report.figures.distances import Distance, distances, pair_distances
 from olivevib.report.figures.frequency import frequencies
 from olivevib.report.figures.motion import Window, close_window, time_series, whole
@@ -11,16 +12,22 @@ from olivevib.report.figures.residuals import holdout, residual_map
 from olivevib.report.figures.scene import scene
 from olivevib.report.figures.sensor import overlay
 from olivevib.report.figures.sigma import sigmas
-from olivevib.report.figures.spectra import amplitude_spectra, power_spectra
+from olivevib.report.figures.sigma_map import SigmaMap, sigma_map, sigma_maps
+from olivevib.report.figures.spectra import amplitude_spectra, power_spectra, total_spectra
+from olivevib.report.figures.spectrogram import Spectrogram, spectrogram, spectrograms
+from olivevib.report.figures.transmissibility import transmissibilities
 from olivevib.report.figures.visibility import strips, visibility
 
 __all__ = [
     "MOST_ACROSS",
     "Distance",
+    "SigmaMap",
+    "Spectrogram",
     "Window",
     "amplitude_spectra",
     "boxes",
     "close_window",
+    "decays",
     "distances",
     "frequencies",
     "holdout",
@@ -31,9 +38,15 @@ __all__ = [
     "power_spectra",
     "residual_map",
     "scene",
+    "sigma_map",
+    "sigma_maps",
     "sigmas",
+    "spectrogram",
+    "spectrograms",
     "strips",
     "time_series",
+    "total_spectra",
+    "transmissibilities",
     "visibility",
     "whole",
 ]

@@ -7,6 +7,7 @@ colour. The bytes depend on nothing but the values: no date, no random ids.
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import io
 import re
@@ -88,11 +89,21 @@ _STYLE: Any = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    """The one style of all figures, for as long as one is drawn."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(_STYLE)
-        yield
+    """The one style of all figures, for as long as one is drawn.
+
+    The garbage collector pauses: a figure is one large ring of objects, and looking for what can
+    be freed while it grows costs a fifth of the time.
+    """
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        with mpl.rc_context():
+            mpl.rcdefaults()
+            mpl.rcParams.update(_STYLE)
+            yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def draw(name: str, title: str, height_in: float, paint: Callable[[Figure], None]) -> str:

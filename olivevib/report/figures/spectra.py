@@ -73,10 +73,32 @@ def power_spectra(
     spectrum: Spectrum, names: Mapping[int, str], ids: Sequence[int], nyquist_hz: float
 ) -> str:
     """Power spectral density of the three axes together (powers add), a panel a marker."""
+    about = (f"psd{ids[0]}", "Power spectral density", f"{unit_text(spectrum.unit)}²/Hz, x + y + z")
+    return _totals(spectrum, spectrum.psd.sum(axis=2), names, ids, nyquist_hz, about)
+
+
+def total_spectra(
+    spectrum: Spectrum, names: Mapping[int, str], ids: Sequence[int], nyquist_hz: float
+) -> str:
+    """Amplitude spectrum (peak) of the three axes together (powers add), a panel a marker."""
+    total = np.sqrt(np.sum(spectrum.amplitude**2, axis=2))
+    title = f"Amplitude spectrum of the {spectrum.quantity}"
+    about = (f"{spectrum.quantity}{ids[0]}", title, f"{unit_text(spectrum.unit)} peak, all axes")
+    return _totals(spectrum, total, names, ids, nyquist_hz, about)
+
+
+def _totals(
+    spectrum: Spectrum,
+    total: Floats,
+    names: Mapping[int, str],
+    ids: Sequence[int],
+    nyquist_hz: float,
+    about: tuple[str, str, str],
+) -> str:
+    """One value (F, M) a frequency and marker, a panel a marker; about: name, title, unit."""
     columns = 3
     rows = -(-len(ids) // columns)
     height = 0.66 + 1.1 * rows
-    total = spectrum.psd.sum(axis=2)
     lines = dict(zip(spectrum.ids.tolist(), spectrum.lines, strict=True))
 
     def paint(figure: Figure) -> None:
@@ -93,11 +115,9 @@ def power_spectra(
             ax.set_title(names[marker_id], loc="left", pad=3, fontsize=7.5, fontweight="bold")
         for ax in panels[len(ids) :]:
             ax.remove()
-        unit = f"{unit_text(spectrum.unit)}²/Hz, x + y + z"
-        canvas.note(figure, 0.02, 0.1, unit, va="center", fontsize=8)
+        canvas.note(figure, 0.02, 0.1, about[2], va="center", fontsize=8)
 
-    title = f"Power spectral density of {len(ids)} markers"
-    return canvas.draw(f"psd{ids[0]}", title, height, paint)
+    return canvas.draw(about[0], f"{about[1]} of {len(ids)} markers", height, paint)
 
 
 def _limits(values: Floats) -> tuple[float, float]:

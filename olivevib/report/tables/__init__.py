@@ -8,9 +8,22 @@ from olivevib.report.tables.markers import (
     distance_rows,
     marker_rows,
     phase_rows,
+    phase_word,
     state_rows,
 )
-from olivevib.report.tables.record import provenance_pairs, record_sections, stage_rows
+from olivevib.report.tables.motion import (
+    decay_rows,
+    dose_rows,
+    figure_rows,
+    orbit_rows,
+    transmissibility_rows,
+)
+from olivevib.report.tables.record import (
+    outcome_pairs,
+    provenance_pairs,
+    record_sections,
+    stage_rows,
+)
 from olivevib.report.tables.rig import (
     calibration_facts,
     camera_clocks,
@@ -26,13 +39,20 @@ __all__ = [
     "candidate_accelerations",
     "comparison_lines",
     "comparison_pairs",
+    "decay_rows",
     "distance_rows",
+    "dose_rows",
+    "figure_rows",
     "marker_rows",
+    "orbit_rows",
+    "outcome_pairs",
     "phase_rows",
+    "phase_word",
     "provenance_pairs",
     "record_sections",
     "rig_pairs",
     "stage_rows",
     "state_rows",
     "timing_pairs",
+    "transmissibility_rows",
 ]

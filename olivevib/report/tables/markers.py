@@ -76,7 +76,12 @@ def marker_rows(content: ReportContent) -> list[MarkerRow]:
                 candidates=_candidates(listed, line),
                 amplitude=(x, y, z),
                 acceleration=_acceleration(content, marker),
-                displacement=measure(marker.get("displacement_pp_mm"), digits=3),
+                displacement=measure(
+                    marker.get("displacement_pp_mm"),
+                    "",
+                    marker.get("displacement_pp_sigma_mm"),
+                    digits=3,
+                ),
             )
         )
     return rows
@@ -86,6 +91,8 @@ def _candidates(listed: Sequence[float], line: Line | None) -> tuple[str, ...]:
     """The candidates one by one while they are few; none where the line is not to be seen."""
     if line is not None and line.status not in (*OPEN, LineStatus.SUPPORTED):
         return ()
+    if len(listed) == 1 and line is not None and line.status is LineStatus.SUPPORTED:
+        return ()  # the frequency itself
     shares = line.probabilities if line is not None else ()
     if len(listed) > MOST:
         return (candidates_text(listed),)
@@ -117,12 +124,29 @@ def phase_rows(content: ReportContent) -> list[tuple[str, ...]]:
         if not np.isfinite(d.rms).any():  # too short a phase for any figure
             continue
         out.append((
-            content.marker_name(row.id), clean(row.phase, 30), str(row.samples),
-            *(measure(float(v), digits=3) for v in d.rms), measure(d.extent, digits=3),
+            content.marker_name(row.id), phase_word(content, row.phase), str(row.samples),
+            *(measure(float(v), digits=3) for v in d.rms),
+            measure(d.extent, "", d.extent_sigma, digits=3),
             measure(a.resultant_rms, digits=3), measure(a.resultant_p95, digits=3),
             describe(row.line),
         ))  # fmt: skip
     return out
+
+
+STILL = 5.0  # times the sigma of a position: moving less is rest
+
+
+def phase_word(content: ReportContent, name: str) -> str:
+    """The phase in words: a "rest" in which the markers move is only without shaking."""
+    path, vibration = content.trajectory, content.vibration
+    if name != "rest" or path is None or vibration is None:
+        return clean(name, 30)
+    moved = [row.displacement.resultant_rms for row in vibration.table if row.phase == name]
+    moved = [v for v in moved if np.isfinite(v)]
+    sigma = np.linalg.norm(path.sigma_xyz_mm[path.seen], axis=1)
+    if not moved or not np.isfinite(sigma).any():
+        return name
+    return "no shaking" if max(moved) > STILL * float(np.nanmedian(sigma)) else name
 
 
 def state_rows(content: ReportContent) -> list[tuple[str, list[str]]]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
-from olivevib.report.words import NOT_KNOWN, fact
+from olivevib.report.words import NOT_KNOWN, fact, percent
 
 _MACHINERY = ("markers", "cameras", "accelerometers")
 Pair = tuple[str, str]  # label, value with unit
@@ -16,7 +16,7 @@ Pair = tuple[str, str]  # label, value with unit
 def record_sections(content: ReportContent) -> list[tuple[str, list[Pair]]]:
     """The session record as it was typed: one card a section, keys as words, values with units."""
     out = []
-    for name in ("session", "tree", "machine", "outcome", "markers", "cameras", "accelerometers"):
+    for name in ("session", "tree", "machine", "markers", "cameras", "accelerometers"):
         section = content.record.get(name)
         entries = section if isinstance(section, list | tuple) else [section]
         for number_of, entry in enumerate(entries):
@@ -28,6 +28,23 @@ def record_sections(content: ReportContent) -> list[tuple[str, list[Pair]]]:
                 if pairs:
                     out.append((title, pairs))
     return out
+
+
+def outcome_pairs(content: ReportContent) -> list[Pair]:
+    """What the harvest gave, as it was entered by hand; () where nothing was."""
+    typed = content.record.get("outcome") or {}
+    removed, left = typed.get("removed_kg"), typed.get("left_kg")
+    if removed is None and left is None and not typed.get("damage"):
+        return []
+    share: float | None = None
+    if removed is not None and left is not None and removed + left > 0:
+        share = removed / (removed + left)
+    return [
+        ("fruit removed", fact("removed_kg", removed)[1]),
+        ("fruit left", fact("left_kg", left)[1]),
+        ("share removed", percent(share)),
+        ("damage", clean(typed.get("damage") or "") or NOT_KNOWN),
+    ]
 
 
 def _flat(section: Mapping[str, Any]) -> list[tuple[str, Any]]:

@@ -131,6 +131,9 @@ def _rate(content: ReportContent) -> list[Pair]:
     path = content.trajectory
     if path is None or path.t_s.size < 2:
         return [("frames in space", NOT_KNOWN)]
+    if content.continuous:
+        counts = f"{path.t_s.size}, of a motion fitted to {content.frames} frames"
+        return [("instants of the paths", counts)]
     clock = fit_stamps(path.t_s)
     return [
         ("frame rate on the trial clock", measure(clock.rate_hz, "frames/s", clock.rate_sigma_hz)),

@@ -1,0 +1,78 @@
+"""Camera against accelerometer over all trials of a season: every common line, and what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from olivevib.report.figures import canvas
+
+FEWEST = 3  # lines from which limits of agreement are drawn
+
+
+@dataclass(frozen=True)
+class CommonLine:
+    """One line of one trial as both saw it: peak accelerations with sigmas, m/s²."""
+
+    trial: str
+    f_hz: float
+    optical_m_s2: float
+    optical_sigma_m_s2: float
+    sensor_m_s2: float
+    sensor_sigma_m_s2: float
+
+
+def limits_of_agreement(lines: Sequence[CommonLine]) -> tuple[float, float, float]:
+    """Mean difference and its 95 % limits in % of the mean of both (Bland and Altman 1986)."""
+    each = _differences(lines)
+    middle, spread = float(each.mean()), float(each.std(ddof=1)) if each.size > 1 else float("nan")
+    return middle, middle - 1.96 * spread, middle + 1.96 * spread
+
+
+def _differences(lines: Sequence[CommonLine]) -> np.ndarray:
+    a = np.array([line.optical_m_s2 for line in lines])
+    b = np.array([line.sensor_m_s2 for line in lines])
+    return np.asarray(200 * (a - b) / (a + b))
+
+
+def agreement(lines: Sequence[CommonLine]) -> str:
+    """Left: one against the other with the line of equality. Right: difference over the mean."""
+    a = np.array([line.optical_m_s2 for line in lines])
+    b = np.array([line.sensor_m_s2 for line in lines])
+    sigma_a = np.array([line.optical_sigma_m_s2 for line in lines])
+    sigma_b = np.array([line.sensor_sigma_m_s2 for line in lines])
+
+    def paint(figure: Figure) -> None:
+        left, right = canvas.rows_and_columns(
+            figure, 1, 2, margins_in=(0.65, 0.55, 0.3, 0.45), gaps_in=(0.8, 0)
+        )[0]
+        low, high = 0.7 * min(a.min(), b.min()), 1.4 * max(a.max(), b.max())
+        left.plot([low, high], [low, high], color=canvas.QUIET, lw=0.8, ls=(0, (4, 2)))
+        left.errorbar(b, a, xerr=np.nan_to_num(sigma_b), yerr=np.nan_to_num(sigma_a), fmt="o",
+                      color=canvas.LEFT, ms=3.5, elinewidth=0.8)  # fmt: skip
+        left.set(xscale="log", yscale="log", xlim=(low, high), ylim=(low, high))
+        left.set_xlabel("accelerometer, peak of the line, m/s²")
+        left.set_ylabel("camera, m/s²")
+        for axis in (left.xaxis, left.yaxis):
+            axis.set_major_formatter("{x:g}")
+            axis.set_minor_formatter("")
+        left.grid(which="major")
+        each = _differences(lines)
+        right.axhline(0, color=canvas.QUIET, lw=0.8, ls=(0, (4, 2)))
+        right.plot((a + b) / 2, each, "o", color=canvas.LEFT, ms=3.5, mew=0)
+        if len(lines) >= FEWEST:
+            for at, style in zip(limits_of_agreement(lines), ("-", ":", ":"), strict=True):
+                right.axhline(at, color=canvas.MARK, lw=1, ls=style)
+                right.text(1.01, at, f"{at:+.2g} %", transform=right.get_yaxis_transform(),
+                           va="center", fontsize=6.5)  # fmt: skip
+        right.set_xscale("log")
+        right.xaxis.set_major_formatter("{x:g}")
+        right.xaxis.set_minor_formatter("")
+        right.set_xlabel("mean of both, m/s²")
+        right.set_ylabel("camera less sensor, % of the mean")
+        right.grid(axis="y")
+
+    return canvas.draw("agreement", "Camera against accelerometer, all trials", 3.2, paint)
