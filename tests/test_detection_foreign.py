@@ -29,7 +29,7 @@ def test_reads_the_id_and_keeps_the_printed_corner_order(detector, inverted):
         (found,) = detector.detect(image)
         assert found.id == marker
         assert np.abs(found.corners_px - corners).max() < 0.2
-        assert found.localiser == "edges"
+        assert found.localiser == "template"
         assert found.flags == ()
 
 

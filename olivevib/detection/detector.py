@@ -34,7 +34,8 @@ class Detector:
 
     def follower(self) -> Follower | None:
         """What follows its markers from frame to frame; None where each frame is read by itself."""
-        return Follower(self._reader) if isinstance(self._reader, TemplateReader) else None
+        reader = self._reader
+        return Follower(reader) if isinstance(reader, TemplateReader | ForeignReader) else None
 
     def mirrored_ids(self, grey: Grey) -> tuple[int, ...]:
         """Ids seen as in a mirror: the recording is mirrored. Foreign families cannot tell: ()."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,9 @@ from olivevib.detection.key_fit import KeyBatch, KeyFits, batches_of, fit_keys
 from olivevib.detection.refine import Singles, point_images
 from olivevib.detection.search import Scene, search, smeared_start
 from olivevib.detection.template import LEAST_PATH_PX, Blur
-from olivevib.detection.template_reader import SURE, Found, TemplateReader
+from olivevib.detection.template_reader import SURE, Found
 from olivevib.geometry import homography
+from olivevib.marker import MarkerLibrary
 
 SEARCH_PX = 8  # to either side of where a marker was; twice as far after a miss
 CLEAR, CLEAR_CELL = 0.95, 0.85  # mean weight of a marker, and of its ninths, that is not covered
@@ -49,10 +51,28 @@ class Known:
     misses: int = 0
 
 
+class FittingReader(Protocol):
+    """A reader whose markers are fitted drawings; ``far``: the drawing alone tells its codes."""
+
+    library: MarkerLibrary
+    cards: list[Singles]
+    far: bool
+
+    def fit(
+        self, grey: Grey, H: Floats, code: tuple[int, int, int], blur: Blur | None = None
+    ) -> Found | None:
+        """Fit the marker of a code (row, turn, wrong modules) from pose H; None if it is not it."""
+        ...
+
+    def detection(self, one: Found) -> Detection:
+        """What is said of a fitted marker."""
+        ...
+
+
 class Follower:
     """Follows markers of one library; it depends on the frames and on ``known`` alone."""
 
-    def __init__(self, reader: TemplateReader) -> None:
+    def __init__(self, reader: FittingReader) -> None:
         self._reader = reader
         self._row = {int(i): k for k, i in enumerate(reader.library.ids)}
         self._keys: dict[int, Key] = {}
@@ -153,7 +173,8 @@ class Follower:
     def _believed(self, grey: Grey, key: Key, fits: KeyFits, k: int, H: Floats) -> bool:
         """Whether a fit is a clear marker in even light, near its key: nothing else to ask for."""
         return bool(
-            fits.ncc[k] >= SURE
+            self._reader.far
+            and fits.ncc[k] >= SURE
             and fits.rms[k] <= EVEN * fits.gain[k]
             and fits.weight[k] >= CLEAR
             and fits.cell[k] >= CLEAR_CELL
@@ -214,7 +235,7 @@ def _after(one: Found) -> Known:
     fit, blur = one.card.fit, one.card.blur
     noise = np.asarray(fit.noise / max(float(fit.noise.max()), 1e-9), dtype=np.float32)
     smeared = blur.path_px > LEAST_PATH_PX
-    drawn_at = None if smeared or one.card.uneven else one.H
+    drawn_at = None if smeared or one.card.uneven or one.inverted else one.H
     return Known(one.H, blur, noise, drawn_at, blur)
 
 

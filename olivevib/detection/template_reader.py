@@ -37,12 +37,13 @@ FAR_CODES = 12 / 49  # distance of codes from which the whole drawing tells them
 
 @dataclass(frozen=True)
 class Found:
-    """One fitted marker: its row in the library, pose as printed, fit and wrong modules."""
+    """One fitted marker: its row in the library, pose as printed, fit, wrong modules, polarity."""
 
     row: int
     H: Floats
     card: CardFit
     wrong: int
+    inverted: bool = False
 
 
 class TemplateReader:
@@ -60,7 +61,7 @@ class TemplateReader:
         self._mirrored = SoftReader(mirrored)
         bits, apart = library.layout.code**2, library.distance
         self._wrong = [min(round(most * bits / 49), (apart - 1) // 2) for most in WRONG]
-        self._far = apart >= FAR_CODES * bits
+        self.far = apart >= FAR_CODES * bits
         self.cards = [
             card(library.layout.pattern(code), library.layout.quiet) for code in library.codes
         ]
@@ -95,7 +96,8 @@ class TemplateReader:
 
     def _hypotheses(self, grey: Grey) -> Frames:
         layout = self.library.layout
-        return joined([frame_hypotheses(fine_bars(dark), layout) for dark in dark_passes(grey)])
+        bars = [fine_bars(dark, scale) for dark, scale in dark_passes(grey)]
+        return joined([frame_hypotheses(some, layout) for some in bars])
 
     def _fitted(self, grey: Grey, frames: Frames) -> list[Found]:
         """Accepted markers; of several fits of one code at one place the first stands."""
@@ -131,38 +133,43 @@ class TemplateReader:
         if card_fit is None:
             return None
         fit = card_fit.fit
-        if not _sound(fit, start, self.library.layout.cornerstones):
+        if not sound(fit, start, self.library.layout.cornerstones):
             return None
         again = self._soft.match(grey, fit.H[None])
         wrong = int(again.wrong[0])
         read = int(again.row[0]) == row and int(again.turn[0]) == 0
         clear = read and wrong <= self._wrong[fit.weight < COVERED]
-        if not clear and not (self._far and fit.whole_ncc >= SURE):
+        if not clear and not (self.far and fit.whole_ncc >= SURE):
             return None
         return Found(row, fit.H, card_fit, wrong if read else first_wrong)
 
     def detection(self, one: Found) -> Detection:
         """What is said of a fitted marker."""
-        fit = one.card.fit
-        points = np.vstack([np.zeros((1, 2)), self.library.layout.cornerstones])
-        px, covariance = fitted_points(fit, points)
-        flags = ["occluded"] if fit.cells.min() < CELL else []
-        if one.card.uneven:
-            flags.append("shadowed")
-        return Detection(
-            id=int(self.library.ids[one.row]),
-            corners_px=px[1:],
-            corners_cov_px2=covariance[2:, 2:],
-            centre_px=px[0],
-            centre_cov_px2=covariance[:2, :2],
-            raw_row=px[:, 1],
-            localiser="template",
-            bit_errors=one.wrong,
-            flags=tuple(flags),
-        )
+        return fitted_detection(self.library, one)
 
 
-def _sound(fit: Fit, start: Floats, stones: Floats) -> bool:
+def fitted_detection(library: MarkerLibrary, one: Found) -> Detection:
+    """What is said of a fitted marker: centre and cornerstones with covariance, and flags."""
+    fit = one.card.fit
+    points = np.vstack([np.zeros((1, 2)), library.layout.cornerstones])
+    px, covariance = fitted_points(fit, points)
+    flags = ["occluded"] if fit.cells.min() < CELL else []
+    if one.card.uneven:
+        flags.append("shadowed")
+    return Detection(
+        id=int(library.ids[one.row]),
+        corners_px=px[1:],
+        corners_cov_px2=covariance[2:, 2:],
+        centre_px=px[0],
+        centre_cov_px2=covariance[:2, :2],
+        raw_row=px[:, 1],
+        localiser="template",
+        bit_errors=one.wrong,
+        flags=tuple(flags),
+    )
+
+
+def sound(fit: Fit, start: Floats, stones: Floats) -> bool:
     """Whether a fit may be a marker: it converged near its start, and looks like its drawing."""
     robust = fit.weight < COVERED
     moved = float(np.linalg.norm(fit.H[:2, 2] - start[:2, 2] / start[2, 2]))
