@@ -13,6 +13,7 @@ from olivevib.reconstruction.motion.solve import (
     Model,
     at_theta,
     settle,
+    sways_at,
     with_frequency,
 )
 from olivevib.vibration.verdict import fold
@@ -58,12 +59,13 @@ def zone_peak(
     half = ZONE / model.knots.step_s
     single = replace(model, gain=model.gain[:, :1])
     best: list[tuple[float, float]] = []
+    sways = sways_at(model, model.theta0)
     for k in range(1, int(np.ceil(band_hz[1] / rate_hz)) + 1):
         f = np.arange(k * rate_hz - half, k * rate_hz + half, 0.35 / span_s)
         f = f[(f >= band_hz[0]) & (f <= band_hz[1])]
         for trial in f:
             theta = with_frequency(single, float(trial)).theta0
-            best.append((at_theta(single, theta).evidence, float(trial)))
+            best.append((at_theta(single, theta, sways).evidence, float(trial)))
     return (fold(max(best)[1], rate_hz),) if best else ()
 
 
@@ -71,15 +73,16 @@ def offset_starts(model: Model, f_hz: float, sigma_s: float) -> list[Floats]:
     """Thetas to start from: one, or the best offsets of a search where the anchor is weak."""
     theta = with_frequency(model, f_hz).theta0
     reach = WIDE_SIGMA * sigma_s
-    if not model.active[1] or reach < 0.125 / f_hz:
+    if not model.active[1] or reach < 0.17 / f_hz:
         return [theta]
-    count = 2 * int(np.ceil(reach * 8 * f_hz)) + 1
+    count = 2 * int(np.ceil(reach * 6 * f_hz)) + 1
     offsets = theta[1] + np.linspace(-reach, reach, count)
     trials = []
+    sways = sways_at(model, theta)  # slow enough to stay; only the harmonics are timed anew
     for offset in offsets:
         trial = theta.copy()
         trial[1] = offset
-        trials.append((at_theta(model, trial).evidence, trial))
+        trials.append((at_theta(model, trial, sways).evidence, trial))
     order = sorted(range(count), key=lambda k: -trials[k][0])
     peaks = [
         k

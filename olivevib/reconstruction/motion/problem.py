@@ -145,10 +145,12 @@ class Sway:
     def cross(self, gathered: Floats) -> Floats:
         """(6B, k) products of the sway's columns with gathered others."""
         each = self.D.transpose(0, 2, 1) @ gathered
-        out = np.zeros((6 * self.knots.count, gathered.shape[2]))
-        for i, block in enumerate(each):
-            out[6 * i : 6 * i + 6 * ORDER] += block
-        return out
+        out = np.zeros((self.knots.count, 6, gathered.shape[2]))
+        intervals = len(each)
+        parts = each.reshape(intervals, ORDER, 6, -1)
+        for b in range(ORDER):
+            out[b : b + intervals] += parts[:, b]
+        return out.reshape(6 * self.knots.count, -1)
 
 
 def group_frames(interval: Ints, intervals: int, none: int) -> Ints:

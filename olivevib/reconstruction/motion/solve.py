@@ -143,10 +143,24 @@ def shared_columns(
     return np.concatenate([first[..., :1], second, first[..., 1:]], axis=-1)
 
 
-def reduce(model: Model, problem: Problem, theta: Floats, now: Coefficients | None) -> Reduced:
-    """Eliminate the sway; without ``now`` theta's columns are left zero."""
+def sways_at(model: Model, theta: Floats) -> tuple[Sway, ...]:
+    """The factored sway of each marker at theta's times."""
+    return tuple(
+        sway_part(p, p.times(model.clock(theta)), model.knots, model.precision_sway)
+        for p in model.problems
+    )
+
+
+def reduce(
+    model: Model,
+    problem: Problem,
+    theta: Floats,
+    now: Coefficients | None,
+    sway: Sway | None = None,
+) -> Reduced:
+    """Eliminate the sway (``sway``: already factored); without ``now`` theta's columns are zero."""
     t_s = problem.times(model.clock(theta))
-    sway = sway_part(problem, t_s, model.knots, model.precision_sway)
+    sway = sway or sway_part(problem, t_s, model.knots, model.precision_sway)
     phi, _ = model.phase(theta, t_s)
     Z = gained(harmonic_columns(problem, phi, model.harmonics), gains(model, problem))
     if now is None:
@@ -191,11 +205,11 @@ def back_substitute(model: Model, reduced: Reduced, E: Floats, move: Floats) -> 
     return Coefficients(s.reshape(-1, 6), c.reshape(model.harmonics, 2, 6))
 
 
-def at_theta(model: Model, theta: Floats) -> Branch:
-    """Amplitudes at given theta, nothing of it fitted."""
+def at_theta(model: Model, theta: Floats, sways: tuple[Sway, ...] | None = None) -> Branch:
+    """Amplitudes at given theta, nothing of it fitted; sways: factored, at these or near times."""
     chi2, log_det, found = prior_cost(model, theta), 0.0, []
-    for problem in model.problems:
-        reduced = reduce(model, problem, theta, None)
+    for problem, sway in zip(model.problems, sways or sways_at(model, theta), strict=True):
+        reduced = reduce(model, problem, theta, None, sway)
         part = marginal(model, reduced)
         chi2, log_det = chi2 + part.chi2, log_det + part.log_det
         found.append(back_substitute(model, reduced, part.E, np.zeros(theta.size)))
@@ -209,7 +223,9 @@ def prior_cost(model: Model, theta: Floats) -> float:
     return float(d @ model.precision @ d)
 
 
-def step(model: Model, branch: Branch, limit: Floats) -> tuple[Branch, Floats]:
+def step(
+    model: Model, branch: Branch, limit: Floats, sways: tuple[Sway, ...]
+) -> tuple[Branch, Floats]:
     """One Gauss-Newton step; returns the branch *evaluated where it stood*, moved, and the move.
 
     limit (Q,): the largest step of each of theta.
@@ -217,8 +233,8 @@ def step(model: Model, branch: Branch, limit: Floats) -> tuple[Branch, Floats]:
     q = branch.theta.size
     G, g = model.precision.copy(), model.precision @ (model.theta0 - branch.theta)
     chi2, log_det, parts = prior_cost(model, branch.theta), 0.0, []
-    for problem, now in zip(model.problems, branch.coefficients, strict=True):
-        reduced = reduce(model, problem, branch.theta, now)
+    for problem, now, sway in zip(model.problems, branch.coefficients, sways, strict=True):
+        reduced = reduce(model, problem, branch.theta, now, sway)
         part = marginal(model, reduced)
         G, g = G + part.G, g + part.g
         chi2, log_det = chi2 + part.chi2, log_det + part.log_det
@@ -241,12 +257,15 @@ def settle(model: Model, start: Floats, steps: int = MOST_STEPS) -> Branch:
     """Gauss-Newton from theta ``start`` until nothing moves by more than 0.02 of its sigma."""
     span = float(np.ptp(model.problems[0].zero_s))
     f = max(float(start[0]), 1.0)
-    branch = at_theta(model, start)
+    sways = sways_at(model, start)
+    branch = at_theta(model, start, sways)
     limit = np.full(start.size, 0.6)
     for k in range(steps):
         rows = 0.5 * np.maximum(np.abs(branch.theta[3:SHARED]), 1e-5)
         limit[:SHARED] = [0.3 / span, 0.15 / f, 2e-4, *rows]
-        branch, move = step(model, branch, limit)
+        if k > 0:
+            sways = sways_at(model, branch.theta)
+        branch, move = step(model, branch, limit, sways)
         sigma = 1 / np.sqrt(np.maximum(np.diag(branch.information), 1e-300))
         if k > 0 and (np.abs(move) < CONVERGED * sigma)[model.active].all():
             break
