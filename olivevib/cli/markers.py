@@ -12,6 +12,8 @@ from olivevib.cli.console import Console
 if TYPE_CHECKING:
     from olivevib.marker import MarkerLibrary
 
+FEW = 24  # codes of a generated library: a tree with fewer markers is hardly measured
+
 
 def _library(name: str) -> MarkerLibrary:
     """A library by name or file; a bare file name is also looked for under markers/."""
@@ -46,7 +48,8 @@ def _line(name: str, library: MarkerLibrary) -> str:
 def show(arguments: argparse.Namespace, console: Console) -> int:
     """Print markers as they look, dark modules as blocks."""
     library = _library(arguments.library)
-    ids = values.id_list(arguments.ids) or tuple(int(i) for i in library.ids)
+    asked = ",".join([*arguments.id, *([arguments.ids] if arguments.ids else [])])
+    ids = values.id_list(asked) or tuple(int(i) for i in library.ids)
     from olivevib.pipeline.libraries import only_known
 
     for marker in only_known(library, ids).ids.tolist():
@@ -137,6 +140,13 @@ def generate(arguments: argparse.Namespace, console: Console) -> int:
         f"--seed {arguments.seed} --code {arguments.code}"
     )
     write_text_atomic(path, library_text(library, made))
-    console.say(f"{library.ids.size} codes")
+    console.say(f"{library.ids.size} code{'s' * (library.ids.size != 1)}")
+    if library.ids.size < FEW:
+        mirrors = ", leave --mirrors out" if arguments.mirrors else ""
+        console.say(
+            f"That is few. For more, lower --distance (now {arguments.distance}; 12 gives many)"
+            f"{mirrors}, try another --seed, or take larger codes with --code "
+            f"(now {arguments.code}; then printed modules are smaller)."
+        )
     print(path)
     return 0

@@ -151,6 +151,7 @@ def _marker_verbs(verbs: Any) -> None:
     kinds = parser.add_subparsers(title="what", metavar="WHAT")
     _add(kinds, "list", "markers:list_", "the libraries that can be named")
     show = _add(kinds, "show", "markers:show", "markers as they look, in the terminal")
+    show.add_argument("id", nargs="*", metavar="ID", help="such as 1 2 5-9 (default: all)")
     show.add_argument("--ids", metavar="1,2,5-9")
     draw = _add(kinds, "draw", "markers:draw", "one marker with its quiet zone, as PNG")
     draw.add_argument("id", type=int, metavar="ID")

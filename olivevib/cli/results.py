@@ -21,7 +21,7 @@ def show(arguments: argparse.Namespace, console: Console) -> int:
 
     if arguments.trial is None:
         return _list(arguments.json)
-    facts = summary(Trial.open(find_trial(arguments.trial, Path())))
+    facts = summary(Trial.open(find_trial(arguments.trial, Path())).readable())
     if arguments.json:
         _out(json.dumps(facts, indent=2, ensure_ascii=False, allow_nan=False))
     else:
@@ -100,7 +100,7 @@ def check(arguments: argparse.Namespace, console: Console) -> int:
     for finding in findings:
         _out(f"{finding.state:8} {finding.what}  {finding.words}".rstrip())
     states = {finding.state for finding in findings}
-    return 1 if "lost" in states else 3 if "damaged" in states else 0
+    return 1 if "lost" in states else 3 if states & {"damaged", "remake"} else 0
 
 
 def _out(text: Any) -> None:

@@ -74,14 +74,17 @@ def _markers(rows: list[dict[str, Any]]) -> list[str]:
         return []
     lines = [
         "markers (peak amplitude of the dominant line)",
-        "    id place    seen   x mm    y mm    z mm   p-p mm  rms m/s²  frequency",
+        "  (of the rms no sigma is known; the others' stand in show --json and in the report)",
+        "    id place    seen   x mm    y mm    z mm           p-p mm  rms m/s²  frequency",
     ]
     for m in rows:
         a = [
             f"{m['amplitude_mm'][k]:7.3f}" if _has(m["amplitude_mm"][k]) else "      –"
             for k in "xyz"
         ]
-        pp = f"{m['displacement_pp_mm']:8.3f}" if _has(m["displacement_pp_mm"]) else "       –"
+        pp = "–".rjust(16)
+        if _has(m["displacement_pp_mm"]):
+            pp = with_sigma(m["displacement_pp_mm"], m["displacement_pp_sigma_mm"], 3).rjust(16)
         rms = (
             f"{m['acceleration_rms_m_s2']:9.2f}"
             if _has(m["acceleration_rms_m_s2"])
@@ -115,8 +118,8 @@ def frequency(m: dict[str, Any]) -> str:
     if m["frequency_hz"] is not None:
         sigma = m["frequency_sigma_hz"]
         return f"{with_sigma(m['frequency_hz'], sigma, 4)} Hz, {status}"
-    candidates = m["frequency_candidates_hz"]
-    if not candidates:
+    candidates = list(dict.fromkeys(round(f, 2) for f in m["frequency_candidates_hz"]))
+    if status == "blind" or not candidates:  # candidates of sway are no frequencies
         return str(status)
     shown = [f"{f:.2f}" for f in candidates[:CANDIDATES_SHOWN]]
     more = ", …" if len(candidates) > CANDIDATES_SHOWN else ""

@@ -8,7 +8,9 @@ from pathlib import Path
 
 from olivevib.errors import OlivevibError
 from olivevib.files.capture import verify
+from olivevib.files.packets import frame_stamps
 from olivevib.files.rig_file import read_rig
+from olivevib.files.stamps import read_stamp_file
 from olivevib.files.stills import open_source
 from olivevib.files.store import read_stage
 from olivevib.pipeline.recordings import SIDES
@@ -35,8 +37,10 @@ def check(folder: Path, tick: Tick = silent) -> list[Finding]:
     return [
         Finding("whole", "trial.toml", ""),
         *_recordings(trial, tick),
+        *_stamps(trial),
         *_sensors(trial),
         *_stages(trial),
+        *_outputs(trial),
     ]
 
 
@@ -78,6 +82,53 @@ def _checksums(path: Path, name: str, tick: Tick) -> Iterator[Finding]:
     if verified is not None:
         state = "whole" if verified.whole else "damaged"
         yield Finding(state, f"{name}, checksums", verified.words)
+
+
+def _stamps(trial: Trial) -> Iterator[Finding]:
+    """The files of time stamps that trial.toml names, read."""
+    for side in SIDES:
+        camera = getattr(trial.settings.cameras, side)
+        name = camera.stamps
+        if not name:
+            continue
+        try:
+            frames = len(frame_stamps(trial.path(camera.video)))
+            stamps = read_stamp_file(trial.path(name), camera.video, frames)
+        except OlivevibError as error:
+            yield Finding("lost", name, f"{error}")
+        else:
+            yield Finding("whole", name, f"{len(stamps)} stamps")
+
+
+def _outputs(trial: Trial) -> Iterator[Finding]:
+    """Reports and exports: whether each reached its end; they can always be made anew."""
+    pages = [trial.folder / name for name in ("report.html", "report.pdf")]
+    exports = trial.folder / "exports"
+    files = sorted(p for p in exports.iterdir() if p.is_file()) if exports.is_dir() else []
+    for path in [p for p in pages if p.exists()] + files:
+        name = path.relative_to(trial.folder).as_posix()
+        to = "report" if path in pages else f"export {trial.name} --to {path.suffix[1:]}"
+        again = f"Make it anew: olivevib {to}" + (f" {trial.name}" if path in pages else "")
+        if _ended(path):
+            yield Finding("whole", name, f"{path.stat().st_size} bytes")
+        else:
+            yield Finding("remake", name, f"It ends before its time. {again}")
+
+
+_ENDS = {".html": b"</html>", ".pdf": b"%%EOF", ".step": b"END-ISO-10303-21;", ".dxf": b"EOF",
+         ".parquet": b"PAR1"}  # fmt: skip
+
+
+def _ended(path: Path) -> bool:
+    """Whether a file has the last words of its format (those without any: at least a byte)."""
+    try:
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            file.seek(max(0, size - 64))
+            tail = file.read().rstrip()
+    except OSError:
+        return False
+    return size > 0 and tail.endswith(_ENDS.get(path.suffix.lower(), b""))
 
 
 def _sensors(trial: Trial) -> Iterator[Finding]:

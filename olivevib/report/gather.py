@@ -136,7 +136,7 @@ def provenance(trial: Trial) -> dict[str, str]:
     }
     for stage in STAGES:
         path = trial.folder / stage.file
-        if not path.exists():
+        if not path.exists() or stage.file in dict(trial.damage):
             continue
         header = read_header(path)
         out[f"{stage.file} written by olivevib"] = header.software_version

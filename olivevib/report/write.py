@@ -43,9 +43,10 @@ def write_trial_report(
     """Write the page of one trial as the file ``target`` (self-contained HTML), whole.
 
     Stages that have not run are said to be missing. Returns the files that were written, the page
-    first. Raises InputError where a stage file cannot be read or ``target`` cannot be written.
+    first. A file that cannot be read
+    is left out and named. Raises InputError where ``target`` cannot be written.
     """
-    facts = page_facts(content_of(trial), tick)
+    facts = page_facts(content_of(trial.readable()), tick)
     write_text_atomic(target, render_facts(facts))
     paths = [target]
     if also.pdf:
@@ -82,7 +83,7 @@ def write_season_report(
     entries = []
     for done, (trial, page) in enumerate(trials):
         tick(done, len(trials), f"reading {trial.name}")
-        entries.append(entry_of(trial, _link(page, target.parent) if page else ""))
+        entries.append(entry_of(trial.readable(), _link(page, target.parent) if page else ""))
     write_text_atomic(target, render_season(entries, tick))
     rows = [row for entry in entries for row in entry.table]
     paths = [target, target.with_suffix(".csv")]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from olivevib.comparison import Comparison
-from olivevib.errors import Caution, InputError
+from olivevib.errors import Caution, InputError, OlivevibError
 from olivevib.files.rig_file import read_rig
 from olivevib.files.store import StageFile, read_stage
 from olivevib.geometry import StereoRig
@@ -35,6 +35,7 @@ class Trial:
 
     folder: Path
     settings: TrialSettings
+    damage: tuple[tuple[str, str], ...] = ()  # files left out by ``readable``, and why
 
     @classmethod
     def open(cls, folder: str | Path) -> Trial:
@@ -49,6 +50,27 @@ class Trial:
     def changed(self, changes: Mapping[str, Any]) -> Trial:
         """The trial with dotted settings changed in its trial.toml, comments kept."""
         return Trial(self.folder, change_settings(self.folder, changes))
+
+    def readable(self) -> Trial:
+        """The trial without the files that cannot be read: each counts as not there.
+
+        ``damage`` names them, and ``cautions`` begins with them. A sound trial comes back as it is.
+        """
+        parts: dict[str, Callable[[], object]] = {
+            "rig.toml": lambda: self.rig,
+            "calibration.h5": lambda: self.calibration,
+            "tracks.h5": lambda: self.tracks,
+            "trajectory.h5": lambda: self.reconstruction,
+            "vibration.h5": lambda: self.vibration,
+            "comparison.h5": lambda: self.comparison,
+        }
+        damage = []
+        for name, read in parts.items():
+            try:
+                read()
+            except OlivevibError as error:
+                damage.append((name, f"{error.what} {error.why}".strip()))
+        return replace(self, damage=tuple(damage)) if damage else self
 
     @property
     def name(self) -> str:
@@ -88,7 +110,8 @@ class Trial:
     def rig(self) -> StereoRig | None:
         """The calibrated pair of rig.toml."""
         path = self.folder / RIG
-        return read_rig(path) if path.exists() else None
+        there = path.exists() and RIG not in dict(self.damage)
+        return read_rig(path) if there else None
 
     @cached_property
     def tracks(self) -> StoredTracks | None:
@@ -139,12 +162,21 @@ class Trial:
         """The warnings of every stage that has run, in order."""
         parts = (self.calibration, self.tracks, self.reconstruction, self.vibration)
         found = [c for part in parts if part is not None for c in part.cautions]
-        return tuple(dict.fromkeys([*found, *self._compared[1]]))
+        return tuple(dict.fromkeys([*map(_damaged, self.damage), *found, *self._compared[1]]))
 
     def _stage_file(self, name: str) -> StageFile | None:
         stage = BY_NAME[name]
         path = self.folder / stage.file
-        return read_stage(path, name) if path.exists() else None
+        if not path.exists() or stage.file in dict(self.damage):
+            return None
+        file = read_stage(path, name)
+        if file.schema != stage.schema:
+            raise InputError(
+                f"{path} was written by another version of olivevib.",
+                f"It has schema {file.schema}, this version reads {stage.schema}.",
+                f"Run: olivevib run {self.name}",
+            )
+        return file
 
     def need(self, stage: str) -> InputError:
         """The error for work that needs the result of a stage that has not run."""
@@ -153,3 +185,13 @@ class Trial:
             f"The stage {stage} has not run.",
             f"Run: olivevib run {self.name}",
         )
+
+
+def _damaged(file: tuple[str, str]) -> Caution:
+    """What is said of a file that was left out."""
+    name, why = file
+    return Caution(
+        "file-damaged",
+        f"{name} is left out here: {why}",
+        "Run the trial again (olivevib run): what can be made anew is made anew.",
+    )
