@@ -222,8 +222,11 @@ def analyse(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     facts = sampling_facts(trial, reconstruction.clock)
     phases = [Phase(*row) for row in trial.settings.vibration.phases] or None
     fit = reconstruction.motion
+    if facts.direct and not decided(fit):  # no alias lies in the band: nothing was to be decided
+        fit = None
     if fit is not None and decided(fit):
-        motion, facts, phases = fitted_samples(fit, motion, facts)
+        motion, facts, found = fitted_samples(fit, motion, facts)
+        phases = phases or found
     result = analyse_motion(motion, facts, settings, phases, tick)
     result = replace(result, cautions=(*result.cautions, *cautions))
     if fit is not None:

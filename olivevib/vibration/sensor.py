@@ -20,6 +20,7 @@ from olivevib.vibration.verdict import SamplingFacts
 from olivevib.vibration.windows import window
 
 _CYCLE = 5.0  # integrals keep frequencies up to that many times the band's upper end
+_ENDS = 3.0  # periods of the corner that the record's ends disturb
 _LINE = LineSettings(sway=False)
 
 
@@ -124,7 +125,7 @@ def _integrals(
     frequencies up to top_hz.
     """
     clock: Clock = clock_of(t_s)
-    if not clock.even or clock.span_s * corner_hz < 4:
+    if not clock.even or clock.span_s * corner_hz < 4 * _ENDS:
         return None, None
     n, rate = t_s.size, clock.rate_hz
     padded = fft.next_fast_len(2 * n, real=True)
@@ -136,7 +137,7 @@ def _integrals(
     gain = np.zeros(kept)
     gain[1:] = 1e3 / (1 + (2 * np.pi * corner_hz / omega[1:]) ** 8)
     gain[1:] *= coarse / padded / omega[1:] ** 2
-    inside = _inside(t_s, phase, padded / coarse / rate, 1 / corner_hz)
+    inside = _inside(t_s, phase, padded / coarse / rate, _ENDS / corner_hz)
     path = fft.irfft(-gain[:, None] * whole, coarse, axis=0)[inside]
     speed = fft.irfft((-1j * omega * gain)[:, None] * whole, coarse, axis=0)[inside]
     return speed, path

@@ -19,6 +19,7 @@ from olivevib.vibration.kinematics import to_displacement
 from olivevib.vibration.line import fit_line
 
 RATE_HZ, SECONDS = 2000.0, 60.0
+_ENDS_S = 4.0  # endaq tapers 3 s at each end
 _NOT_INSTALLED = "not installed (pip install endaq)"
 
 
@@ -38,7 +39,7 @@ def beside(effort: Effort, tick: Tick) -> Part:
         (
             "olivevib",
             line.f_hz - f,
-            100 * (line.amplitude[0] / size - 1),
+            100 * (float(line.amplitude[0]) / size - 1),
             *_displacement(t, x, f, size),
         )
     ]
@@ -51,7 +52,7 @@ def beside(effort: Effort, tick: Tick) -> Part:
 
 
 def _displacement(t: Floats, x_mm: Floats, f: float, size: float) -> tuple[float, float]:
-    part = (t > 1) & (t < SECONDS - 1)
+    part = (t > _ENDS_S) & (t < SECONDS - _ENDS_S)
     turn = 2 * np.pi * f * t[part]
     waves = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     c = np.linalg.lstsq(waves, x_mm[part], rcond=None)[0]
