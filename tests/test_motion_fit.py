@@ -1,0 +1,136 @@
+"""The continuous-time fit on projected points with known truth: frequency, amplitude, verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_motion_parts import anchor_of, scene
+
+from olivevib.reconstruction.motion import Anchor, MotionSettings, fit_motion
+from olivevib.reconstruction.motion.evaluate import phase_of
+from olivevib.studies import blind
+from olivevib.studies.blind_scenes import orbit, rig, sight
+from olivevib.studies.study import Effort
+from olivevib.vibration.types import LineStatus
+
+CLAIMS = (LineStatus.CONFIRMED, LineStatus.SUPPORTED)
+NEAR = MotionSettings(band_hz=(16.0, 44.0), band_declared=True)
+
+
+def fitted(s, seed=0, settings=None, anchor=None):
+    seen = sight(s, rig(), np.random.default_rng(seed))
+    return seen, fit_motion(seen, rig(), anchor or anchor_of(s), settings)
+
+
+def test_a_shaker_above_the_frame_rates_half_is_measured_and_confirmed():
+    s = scene(25.3)
+    seen, fit = fitted(s)
+    assert fit.status is LineStatus.CONFIRMED, fit.reasons
+    assert fit.kind == "steady"
+    assert abs(fit.f_hz - 25.3) < 2e-3
+    t = fit.timing
+    offset = s.offset_s + seen.reference_row * (s.readout_s[1] - s.readout_s[0]) / 720
+    assert abs(t.right_offset_s - offset) < 100e-6
+    assert abs(t.left_row_time_s / (s.readout_s[0] / 720) - 1) < 0.03
+    amplitude = np.hypot(fit.markers[0].cosine[0], fit.markers[0].sine[0])[:3]
+    assert np.abs(amplitude - np.abs(s.amplitude[0, 0, :3]))[:2].max() < 0.03
+    assert np.abs(amplitude - np.abs(s.amplitude[0, 0, :3]))[2] < 0.15
+    assert 0.8 < fit.chi2 < 1.3
+    assert "led" in fit.reasons[0]
+
+
+def test_the_motion_between_frames_and_its_acceleration_come_out_within_their_sigma():
+    s = scene(25.3)
+    _, fit = fitted(s)
+    at = np.linspace(0.4, 3.6, 700)
+    motion = fit.evaluate(at)
+    true = s.motion(0, at)[:, :3]
+    error = motion.xyz_mm[:, 0] - true
+    error -= error.mean(axis=0)  # the place is the mean pose's, not the motion's
+    assert error[:, :2].std() < 0.03
+    z = error / motion.sigma_xyz_mm[:, 0]
+    assert 0.3 < np.sqrt(np.mean(z**2)) < 2.0
+    e = 1e-4
+    rate = (s.motion(0, at + e) - s.motion(0, at - e))[:, :3] / (2 * e)
+    assert np.abs(motion.velocity_mm_s[:, 0] - rate)[:, :2].std() < 0.02 * np.abs(rate).max()
+    bend = (s.motion(0, at + e) - 2 * s.motion(0, at) + s.motion(0, at - e))[:, :3] / e**2 * 1e-3
+    difference = motion.acceleration_m_s2[:, 0] - bend
+    assert difference[:, :2].std() < 0.02 * np.abs(bend).max()
+    assert np.isnan(fit.evaluate(np.array([-1.0])).xyz_mm).all()
+
+
+@pytest.mark.parametrize("case", ["global", "unknown"])
+def test_nothing_is_claimed_with_nothing_to_tell_by(case):
+    if case == "global":
+        s = scene(readout_s=(0.0, 0.0), offset_s=0.0, drift=0.0, drops=0.0)
+        anchor = Anchor(0.0, 0.0, 0.0, 0.0, "global", 0.0, 2e-5, 0.0, "calibration", True, 1e-6)
+    else:
+        s, anchor = scene(), Anchor(right_offset_s=0.009)
+    _, fit = fitted(s, anchor=anchor, settings=NEAR)
+    assert fit.status not in CLAIMS, fit.reasons
+
+
+def test_without_true_stamps_it_stays_aliased():
+    s = scene()
+    _, fit = fitted(s, anchor=replace(anchor_of(s), stamps_true=False), settings=NEAR)
+    assert fit.status is LineStatus.ALIASED
+
+
+def test_a_line_at_the_frame_rate_is_blind_in_step():
+    s = scene(29.4, offset_s=0.0, drift=0.0)
+    _, fit = fitted(s, settings=NEAR)
+    assert fit.status in (LineStatus.BLIND, LineStatus.NONE), fit.reasons
+
+
+def test_sigma_agrees_with_repeated_noise():
+    s = scene(23.7, mm=1.5)
+    z = []
+    for seed in range(8):
+        seen, fit = fitted(s, seed, NEAR)
+        assert abs(fit.f_hz - 23.7) < 0.05
+        t = fit.timing
+        offset = s.offset_s + seen.reference_row * (s.readout_s[1] - s.readout_s[0]) / 720
+        got = np.hypot(fit.markers[0].cosine[0], fit.markers[0].sine[0])
+        sigma = fit.markers[0].amplitude_sigma()[0]
+        z += [
+            (t.frequency_hz - 23.7) / t.sigma("frequency_hz"),
+            (t.right_offset_s - offset) / t.sigma("right_offset_s"),
+            *((got - np.abs(s.amplitude[0, 0])) / sigma)[:3],
+        ]
+    assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.5
+
+
+def test_a_wandering_speed_is_followed():
+    s = scene(21.3, kind="wandering", span_s=4.0)
+    _, fit = fitted(s, settings=NEAR)
+    assert fit.kind == "wandering"
+    assert abs(fit.f_hz - 21.3) < 0.05
+    at = np.linspace(0.4, 3.6, 200)
+    e = 1e-4
+    true = (s.phase(at + e) - s.phase(at - e)) / (4 * np.pi * e)
+    found = phase_of(fit, at - fit.shift_s)[1] / (2 * np.pi)
+    assert np.std(found - true) < 0.02
+    assert fit.chi2 < 1.4
+
+
+def test_free_motion_claims_no_frequency():
+    draws = np.random.default_rng(2)
+    s = scene(mm=1e-6, sway=((1.3, orbit(draws, 6.0, 0.01)), (3.9, orbit(draws, 1.0, 0.002))))
+    _, fit = fitted(s, settings=MotionSettings(periodic=False))
+    assert fit.kind == "free"
+    assert fit.status is LineStatus.NONE
+    at = np.linspace(0.3, 3.7, 200)
+    error = fit.evaluate(at).xyz_mm[:, 0] - s.motion(0, at)[:, :3]
+    error -= error.mean(axis=0)
+    assert error[:, :2].std() < 0.06
+    assert error[:, 2].std() < 0.4
+
+
+def test_the_study_counts_verdicts_against_truth():
+    study = blind.run(Effort(share=0.0004, seed=3))
+    assert sum(row[1] for row in study.tables[0].rows) == 4
+    wrong = next(g for g in study.goals if g.quantity == "wrong branch among confirmed")
+    assert wrong.measured.startswith("0 of")
+    assert wrong.reached is None  # too few to claim
