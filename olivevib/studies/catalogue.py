@@ -37,6 +37,7 @@ PAPER: tuple[Entry, ...] = (
     Entry("6.3", "two toy cars on closed tracks, in step and 2 ms apart", "toy_cars:run"),
 )
 BENCHMARKS: tuple[Entry, ...] = (
+    Entry("blind", "frequency above the frame rate: verdict against truth, blind", "blind:run"),
     Entry("capture", "what the recorder loses, and what its checksums find", "capture.study:run"),
     Entry("calibration", "accuracy and time beside cv2", "calibration.peer:run"),
     Entry("calibration-centres", "centres of coded markers", "calibration.centres:run"),
