@@ -41,7 +41,9 @@ def halves_test(fit: JointFit) -> tuple[HalfTest, ...]:
         focal = np.abs(a - b)[[0, 1, 6, 7]] / a[[0, 1, 6, 7]]
         side, parameter = divmod(worst, 4)
         label = f"{LENS[parameter]} of the {SIDES[side]} camera"
-        out.append(HalfTest(name, float(np.abs(z).max()), label, 100 * float(focal.max())))
+        rms = float(np.sqrt((z * z).mean()))
+        largest = float(np.abs(z).max())
+        out.append(HalfTest(name, largest, label, 100 * float(focal.max()), rms))
     return tuple(out)
 
 
@@ -199,7 +201,7 @@ def _lag(e: Evidence) -> Iterator[Caution]:
     if abs(lag) > max(3 * sd, 0.001):
         word = "late" if lag > 0 else "early"
         yield Caution(
-            "late-camera",
+            "late-camera" if lag > 0 else "early-camera",
             f"The right camera is {1e3 * abs(lag):.1f} ± {1e3 * sd:.1f} ms {word}; this is "
             "corrected in the calibration.",
             "It holds for this recording only; let trial and board be one recording, or wave the "

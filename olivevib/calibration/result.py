@@ -81,14 +81,15 @@ class BoardPoses:
 
 @dataclass(frozen=True)
 class HalfTest:
-    """Two halves of the views against each other: name, largest |z|, of which parameter, and the
-    largest relative difference of a focal length in %.
+    """Two halves of the views against each other: name, largest |z|, of which parameter, the
+    largest relative difference of a focal length in %, and the rms z of all eight.
     """
 
     name: str
     largest_z: float
     parameter: str
     focal_percent: float
+    rms_z: float = float("nan")
 
 
 @dataclass(frozen=True)

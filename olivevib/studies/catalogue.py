@@ -37,6 +37,7 @@ PAPER: tuple[Entry, ...] = (
     Entry("6.3", "two toy cars on closed tracks, in step and 2 ms apart", "toy_cars:run"),
 )
 BENCHMARKS: tuple[Entry, ...] = (
+    Entry("batch", "overhead, two workers, kill -9 and resume, memory", "seasons.batch:run"),
     Entry("blind", "frequency above the frame rate: verdict against truth, blind", "blind:run"),
     Entry("capture", "what the recorder loses, and what its checksums find", "capture.study:run"),
     Entry("calibration", "accuracy and time beside cv2", "calibration.peer:run"),
@@ -52,6 +53,7 @@ BENCHMARKS: tuple[Entry, ...] = (
     Entry("detection-clutter", "false markers in leaf clutter", "detection.clutter:run"),
     Entry("detection-speed", "CPU time of a full scan, beside peers", "detection.speed:run"),
     Entry("exposure", "what the exposure takes from an amplitude", "exposure:run"),
+    Entry("report", "time and size of reports and exports", "seasons.report:run"),
     Entry("vibration", "lines, conversion, damping, comparison, import, cost", "vibration:run"),
 )
 
