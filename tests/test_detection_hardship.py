@@ -9,7 +9,7 @@ from rendered_markers import Canvas, Look, cover, dapple, motion, pose, shadow_e
 from test_detection_paper import LIBRARY, PLACES, places
 
 from olivevib.detection.card_fit import fit_card
-from olivevib.detection.noise import autocorrelation
+from olivevib.detection.noise import autocorrelation, edge_noise
 from olivevib.detection.refine import fitted_points
 from olivevib.detection.template import Blur, card
 from olivevib.detection.template_reader import TemplateReader
@@ -191,6 +191,18 @@ def test_autocorrelation_of_white_and_of_smoothed_noise():
     assert np.count_nonzero(kernel) > 8
     assert kernel[2, 3] / kernel[2, 2] == pytest.approx(np.exp(-1 / (4 * 0.64)), abs=0.08)
     assert np.array_equal(kernel, kernel[::-1, ::-1])
+
+
+def test_noise_that_grows_with_the_slope_is_seen_and_white_noise_left_alone():
+    rng = np.random.default_rng(2)
+    slope2 = rng.exponential(1.0, 4000).astype(np.float32)
+    clear = np.ones(4000, bool)
+    white = rng.normal(0, 2, 4000).astype(np.float32)
+    assert (edge_noise(white, slope2, clear) == 1).all()
+    louder = (white * np.sqrt(1 + 2 * slope2)).astype(np.float32)
+    noise = edge_noise(louder, slope2, clear)
+    assert np.sqrt((noise**2).mean()) == pytest.approx(1, rel=1e-3)
+    assert noise == pytest.approx(np.sqrt((1 + 2 * slope2) / 3), rel=0.2)
 
 
 def test_false_matches_are_as_rare_as_stated():

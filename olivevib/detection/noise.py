@@ -1,7 +1,8 @@
 """The covariance of a fit when neighbouring pixels' noise agrees.
 
 In sharpened, demosaiced, denoised and JPEG images a pixel's noise resembles its neighbours':
-C = Σ R(l) E(x) E(x + l) over lags l, with R the residuals' own autocorrelation.
+C = Σ R(l) s(x) E(x) s(x + l) E(x + l) over lags l, with R the residuals' own autocorrelation. There
+noise is also larger along edges, where all that the fit knows comes from: s(x), from the residuals.
 """
 
 from __future__ import annotations
@@ -19,15 +20,19 @@ if TYPE_CHECKING:
 LAGS = 2  # px, up to which noise may be correlated
 DOUBT = 3.0  # standard deviations that make a correlation of the noise believable
 UNKNOWNS = 15  # of a fit in even, still light
+LEAST_FLAT = 0.1  # noise variance away from edges, of the mean, at least
 
 
 def noise_covariance(
-    pixels: Pixels, E: Singles, residual: Singles, clear: Bools
+    pixels: Pixels, E: Singles, residual: Singles, clear: Bools, slope2: Singles
 ) -> tuple[Floats, Singles]:
     """Covariance (8, 8) of estimates Σ E(x) r(x), E (8, N), from the residuals that are clear.
 
-    And the noise itself: its autocorrelation, variance in the middle.
+    And the noise itself: its autocorrelation, variance in the middle. slope2 (N,): squared slope of
+    the fitted image, in any unit.
     """
+    uneven = edge_noise(residual, slope2, clear)
+    E, residual = E * uneven, residual / uneven
     left, top = int(pixels.x.min()) - LAGS, int(pixels.y.min()) - LAGS
     shape = (int(pixels.y.max()) - top + LAGS + 1, int(pixels.x.max()) - left + LAGS + 1)
     at = (pixels.y - top) * shape[1] + (pixels.x - left)
@@ -44,6 +49,26 @@ def noise_covariance(
     smeared = cv2.filter2D(field.reshape(*shape, 8), -1, kernel, borderType=cv2.BORDER_CONSTANT)
     C: Floats = (E @ smeared.reshape(-1, 8)[at]).astype(np.float64)
     return (C + C.T) / 2, kernel
+
+
+def edge_noise(residual: Singles, slope2: Singles, clear: Bools) -> Singles:
+    """Noise (N,) of the pixels in units of its root mean square: variance a + b slope².
+
+    Ones where the residuals do not show, beyond doubt, that edges are noisier.
+    """
+    r2 = residual[clear].astype(np.float64) ** 2
+    s = slope2[clear].astype(np.float64)
+    mean, spread = float(s.mean()), float(s.std())
+    if spread <= 0 or r2.size <= UNKNOWNS:
+        return np.ones_like(residual)
+    level = float(r2.mean())
+    b = float(((s - mean) * r2).mean()) / spread**2
+    if b * spread * np.sqrt(r2.size) < DOUBT * np.sqrt(2) * level:
+        return np.ones_like(residual)
+    a = max(level - b * mean, LEAST_FLAT * level)
+    variance = np.asarray(a + b * slope2, dtype=np.float32)
+    out: Singles = np.sqrt(variance / variance[clear].mean(), dtype=np.float32)
+    return out
 
 
 def autocorrelation(noise: Singles, seen: Singles) -> Singles:

@@ -173,7 +173,8 @@ def fit_template(template: Template, pixels: Pixels) -> Fit | None:
     H = _from_template(pixels, end.state.W) @ template.H
     counts = np.maximum(np.bincount(pixels.cell, minlength=9), 1)
     estimate = (inverse[:8].astype(np.float32) @ (WJ / np.sqrt(pixels.trust))).astype(np.float32)
-    covariance, noise = noise_covariance(pixels, estimate, whitened, clear)
+    slope2 = end.J[2] ** 2 + end.J[5] ** 2  # by a shift along x, along y
+    covariance, noise = noise_covariance(pixels, estimate, whitened, clear, slope2)
     return Fit(
         H=H / H[2, 2],
         image=pixels.level - end.residual,
