@@ -134,3 +134,14 @@ def test_the_study_counts_verdicts_against_truth():
     wrong = next(g for g in study.goals if g.quantity == "wrong branch among confirmed")
     assert wrong.measured.startswith("0 of")
     assert wrong.reached is None  # too few to claim
+
+
+def test_an_offset_of_many_milliseconds_is_found_from_sway_and_line():
+    s = scene(25.3, offset_s=-0.118)
+    anchor = replace(anchor_of(s), right_offset_s=0.0, right_offset_sigma_s=np.inf)
+    seen, fit = fitted(s, anchor=anchor)
+    offset = s.offset_s + seen.reference_row * (s.readout_s[1] - s.readout_s[0]) / 720
+    assert fit.status is LineStatus.CONFIRMED
+    assert abs(fit.f_hz - 25.3) < 5e-3
+    assert abs(fit.timing.right_offset_s - offset) < 150e-6
+    assert not fit.timing.offset_slip

@@ -107,6 +107,9 @@ def _status(
         return LineStatus.ALIASED, (why, _alike(facts))
     if facts.strength < LINE_EVIDENCE:
         return LineStatus.NONE, ("No periodic motion stands out of the noise.",)
+    if rate > 2 * settings.band_hz[1]:
+        why = f"{rate:.2f} frames/s exceed twice the band: no alias lies in it."
+        return LineStatus.DIRECT, (why,)
     if facts.fast_hz_s > CHIRP_HZ_S and facts.chi2 > CHIRP_CHI2:
         return LineStatus.CHIRP, ("The speed changes too fast here; not resolved.",)
     like = zone(f, facts)

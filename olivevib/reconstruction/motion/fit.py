@@ -20,6 +20,7 @@ from olivevib.reconstruction.motion.finish import (
     timing_of,
 )
 from olivevib.reconstruction.motion.free import fit_free
+from olivevib.reconstruction.motion.offset import with_offset
 from olivevib.reconstruction.motion.pixels import Pixels, look
 from olivevib.reconstruction.motion.prepare import (
     layout,
@@ -57,6 +58,8 @@ class Prepared:
     model: Model
     start_s: float
     end_s: float
+    offset_sigma_s: float
+    offset_found: bool
 
 
 def fit_motion(
@@ -76,8 +79,7 @@ def fit_motion(
         return fit_free(observations, rig, clock, settings)
     ready = prepare(observations, rig, clock, settings)
     candidates = candidate_frequencies(ready)
-    sigma = offset_sigma(clock, settings)
-    weighed = br.weigh(ready.model, candidates, sigma, tick)
+    weighed = br.weigh(ready.model, candidates, ready.offset_sigma_s, tick)
     model, best = refine(ready, ready.model, weighed.branches[0])
     kind, fast = "steady", 0.0
     if chi2_of(model, best) > WORSE or ready.pixels.scale > WORSE:
@@ -103,12 +105,27 @@ def prepare(
 ) -> Prepared:
     """Pixels, poses and the linear problem about the sway; phase: of a wandering line."""
     pixels = look(observations, settings.knot_s, settings.harmonics, phase)
-    clock, knots, start, end = layout(observations, anchor, settings, pixels.knot_s)
+    searched, found = with_offset(observations, rig, anchor, settings, pixels)
+    clock, knots, start, end = layout(observations, searched, settings, pixels.knot_s)
     poses, problems, whites = about_sway(
         observations, rig, pixels, clock, knots, sway_precision(settings)
     )
-    model = model_of(problems, observations, anchor, settings, knots, clock.mid_s)
-    return Prepared(observations, rig, anchor, settings, pixels, poses, whites, model, start, end)
+    model = model_of(problems, observations, searched, settings, knots, clock.mid_s)
+    sigma = offset_sigma(searched, settings)
+    return Prepared(
+        observations=observations,
+        rig=rig,
+        anchor=anchor,
+        settings=settings,
+        pixels=pixels,
+        poses=poses,
+        whites=whites,
+        model=model,
+        start_s=start,
+        end_s=end,
+        offset_sigma_s=sigma,
+        offset_found=found,
+    )
 
 
 def candidate_frequencies(ready: Prepared) -> Floats:
@@ -201,7 +218,9 @@ def _result(
     theta, row = best.theta, ready.observations.reference_row
     f = float(theta[0])
     timing = timing_of(theta, row, covariance)
-    timing = replace(timing, row_time_keeps=keeps_branch(f, facts.rate_hz))
+    timing = replace(
+        timing, row_time_keeps=keeps_branch(f, facts.rate_hz), offset_slip=not ready.offset_found
+    )
     pixel_amplitude = float(np.linalg.norm(facts.amplitude_mm)) * _px_per_mm(ready)
     _, refused = blur_gains(ready.observations, ready.settings, f, pixel_amplitude)
     psi = model.psi
