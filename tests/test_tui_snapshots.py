@@ -14,8 +14,11 @@ from pytest_textual_snapshot import SVGImageExtension
 from small_videos import make_video
 from textual.widgets import Input
 from tui_app import press, settle, started
+from tui_live import board, live
 
-from olivevib.errors import InputError
+from olivevib.errors import Caution, InputError
+from olivevib.tui.capturing import Recorded, Recording, told_of
+from olivevib.tui.screens.live import LivePage
 from olivevib.tui.views.progress import Progress
 
 SIZES = ((120, 40), (80, 24))
@@ -40,7 +43,12 @@ WALK = (
     ("settings", "escape s right_square_bracket right_square_bracket"),
     ("edit", "enter"),
     ("pictures", "escape escape k"),
-    ("form", "escape escape n T 0 7"),
+    ("parameters", "p down down plus"),
+    ("spectrogram", "p escape g"),
+    ("phases", "escape m p"),
+    ("form", "escape escape escape n T 0 7"),
+    ("choose", "tab tab tab tab tab ctrl+o"),
+    ("capture", "escape escape c ctrl+r"),
 )
 
 
@@ -59,6 +67,7 @@ def workspace(made, tmp_path, monkeypatch) -> Path:
     monkeypatch.delenv("NO_COLOR", raising=False)
     shutil.copytree(made, tmp_path / "olive")
     monkeypatch.chdir(tmp_path / "olive")
+    monkeypatch.setattr("olivevib.tui.screens.capture.camera_lines", tuple)
     return Path()
 
 
@@ -112,6 +121,29 @@ async def test_work_errors_and_an_empty_folder(svg, workspace, tmp_path, monkeyp
     async with started(workspace, size) as (app, pilot):
         if await taken(app, pilot) != svg(name=name_of("empty", size)):
             changed.append("empty")
+    assert not changed
+
+
+@pytest.mark.parametrize("size", SIZES, ids=["120x40", "80x24"])
+async def test_a_running_capture_looks_as_it_did(svg, workspace, size, monkeypatch):
+    """Fixed states of a capture, so that no clock and no camera is in the picture."""
+    changed = []
+    async with started(workspace, size) as (app, pilot):
+        monkeypatch.setattr(app, "start", lambda job: None)
+        told = told_of({"trial": "T09", "left": "0", "right": "1"})
+        page = LivePage(workspace, Recording(workspace, told))
+        await app.push_screen(page)
+        for name, state in (("aiming", live(0.0)), ("recording", live(4.0)), ("board", board())):
+            page.post_message(LivePage.Seen(state))
+            await settle(pilot)
+            if await taken(app, pilot) != svg(name=name_of(f"live {name}", size)):
+                changed.append(name)
+        cautions = (Caution("dropped-frames", "The left camera skipped 3 of 600 frames.", "Use …"),)
+        words = "8 of 8 markers, 3 drops, cameras 9.3 ms apart: good for 5–45 Hz"
+        page.post_message(LivePage.Over(Recorded(words, cautions, workspace / "trials/T09", None)))
+        await settle(pilot)
+        if await taken(app, pilot) != svg(name=name_of("live verdict", size)):
+            changed.append("verdict")
     assert not changed
 
 

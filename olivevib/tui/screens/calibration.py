@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from olivevib.calibration.guidance import Guidance
 
 SIDES = ("left", "right")
-PANES = ("left-board", "right-board", "rig")
+PANES = ("left-board", "right-board", "in-space")
 
 
 class CalibrationPage(Page):
@@ -43,7 +43,7 @@ class CalibrationPage(Page):
     JUMPS = (
         Jump("l", "#left-board"),
         Jump("r", "#right-board"),
-        Jump("c", "#rig"),
+        Jump("c", "#in-space"),
         Jump("v", "#verdict"),
     )
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -66,7 +66,7 @@ class CalibrationPage(Page):
         with Horizontal(id="boards"):
             for side in SIDES:
                 yield Plot(id=f"{side}-board", title=f"{side} camera")
-            yield Plot(id="rig", title="in space")
+            yield Plot(id="in-space", title="in space")
         with VerticalScroll(id="verdict", classes="pane"):
             yield Static("reading …", id="verdict-text", markup=False)
 
@@ -89,7 +89,7 @@ class CalibrationPage(Page):
             plot = self.query_one(f"#{coverage.side}-board", Plot)
             plot.show(partial(coverage_plot, coverage))
         if value.scene is not None:
-            self.query_one("#rig", Plot).show(partial(rig_plot, value.scene))
+            self.query_one("#in-space", Plot).show(partial(rig_plot, value.scene))
         self.query_one("#verdict-text", Static).update(
             calibration_text(value.summary, value.places, value.cautions, self.olive.palette)
             if value.coverage

@@ -42,8 +42,8 @@ class PicturesPage(TuningPage):
     )
     JUMPS = (Jump("p", "#whole"), Jump("w", "#inset"))
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("space", "play", "Play, stop"),
-        Binding("o,tab", "camera", "Other camera", key_display="o"),
+        Binding("space", "play", "Play"),
+        Binding("o,tab", "camera", "Camera", key_display="o"),
         Binding("z", "zoom", "Window"),
         Binding("right_square_bracket", "marker(1)", "Next marker", key_display="]"),
         Binding("left_square_bracket", "marker(-1)", "Marker before", show=False, key_display="["),

@@ -78,7 +78,8 @@ class TrialsPage(Page):
         yield Static(id="empty", markup=False)
 
     def on_mount(self) -> None:
-        """Start with the table."""
+        """Start with the table; the search takes no keys while it is hidden."""
+        self.query_one("#search").can_focus = False
         self.query_one("#trials").border_title = "Trials"
         self.query_one("#trials").focus()
 
@@ -146,6 +147,8 @@ class TrialsPage(Page):
         table.border_subtitle = " · ".join(parts)
         if marked in self._shown:
             table.move_cursor(row=self._shown.index(marked))
+        if self.focused is None and self._shown:
+            table.focus()
         self._explain()
 
     @property
@@ -246,6 +249,7 @@ class TrialsPage(Page):
         """Type part of a name."""
         search = self.query_one("#search", Input)
         search.add_class("-shown")
+        search.can_focus = True
         search.focus()
 
     @on(Input.Changed, "#search")
@@ -264,4 +268,5 @@ class TrialsPage(Page):
         elif search.has_class("-shown"):
             search.value = ""
             search.remove_class("-shown")
+            search.can_focus = False
             self.query_one("#trials").focus()
