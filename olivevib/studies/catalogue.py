@@ -42,6 +42,7 @@ BENCHMARKS: tuple[Entry, ...] = (
     Entry("capture", "what the recorder loses, and what its checksums find", "capture.study:run"),
     Entry("calibration", "accuracy and time beside cv2", "calibration.peer:run"),
     Entry("calibration-centres", "centres of coded markers", "calibration.centres:run"),
+    Entry("calibration-faults", "twelve seeded faults, false alarms", "calibration.faults:run"),
     Entry("calibration-webcams", "four webcams: unused frames, latency", "calibration.webcams:run"),
     Entry("detection", "all of the detection-… studies", "detection.everything:run"),
     Entry("detection-rates", "markers found by size and tilt, beside peers", "detection.rates:run"),

@@ -1,0 +1,1 @@
+"""Reports, exports and batches in figures: time, size, memory, resuming, equal results."""
