@@ -129,7 +129,8 @@ def permitted(scene: Scene, anchor: Anchor, size_mm: float) -> bool:
     px_mm = 950.0 / 1400.0
     readout = float(np.mean(np.abs(scene.readout_s))) / ROWS
     contrast = 2 * np.pi * RATE_HZ * size_mm * px_mm * 2 * HALF_MM * px_mm * readout
-    step = in_step(scene.offset_s, RATE_HZ)
+    at_middle = scene.offset_s + (scene.readout_s[1] - scene.readout_s[0]) / 2
+    step = in_step(at_middle, RATE_HZ)
     f = scene.f_hz
     near = abs(f - 30.0) < (2.7 if step else 0.3)
     marks = (7.5, 10.0, 15.0, 20.0, 22.5, 37.5, 40.0) if step else ()

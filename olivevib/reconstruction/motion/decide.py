@@ -17,7 +17,7 @@ from olivevib.vibration.types import LineStatus
 CONFIRMED_LEAD = 25.0
 SUPPORTED_LEAD = 5.0
 CHI2_LIMIT = 1.5
-NOISE_LIMIT = 3.0  # measured noise over the localiser's above which nothing is confirmed
+NOISE_LIMIT = 5.0  # measured noise over the localiser's above which nothing is confirmed
 LINE_EVIDENCE = 12.0  # over sway alone below which no line stands out
 AMPLITUDE_SHARE = 0.1  # sigma over amplitude above which a line is blind
 STEP_S = 5e-3  # cameras nearer than this to the same instant count as in step
