@@ -91,7 +91,7 @@ def frames() -> Trajectory:
     return Trajectory(
         t_s=t,
         ids=ids,
-        sample_t_s=t[:, None] + np.array([0.002, 0.004, 0.006]),
+        sample_t_s=t[:, None] + np.array([0.002, 0.004, 0.019]),
         xyz_mm=xyz,
         sigma_xyz_mm=sigma,
         covariance_mm2=np.einsum("nmi,ij->nmij", sigma**2, np.eye(3)),
@@ -132,13 +132,15 @@ def test_a_fine_grid_inside_frames_outside_gaps_stay_gaps(frames):
     inside = (path.t_s >= 1.01) & (path.t_s <= 3.01)
     np.testing.assert_allclose(np.diff(path.t_s[inside]), 1 / 240, atol=1e-9)
     assert (np.diff(path.t_s) > 0).all()
+    for k in (3, 7, 9):
+        assert path.samples(k).t_s.size  # every marker's own times increase
     seen = path.seen
     hidden = inside & (path.t_s > 1.53) & (path.t_s < 1.78)
     assert not seen[hidden, 0].any() and seen[hidden, 1].all()
     assert (path.state[hidden, 0] == State.HIDDEN).all()
     here = inside & seen[:, 0]
     np.testing.assert_allclose(path.xyz_mm[here, 0], np.array([30, 0, 1400]) + wave(path.t_s[here]))
-    assert int(seen[inside, 2].sum()) == 60  # its own samples, no more
+    assert seen[:, 2].sum() == 121  # its own samples, all of them, no more
     own = path.sample_t_s[seen[:, 2], 2]
     assert np.isin(np.round(own, 9), np.round(frames.sample_t_s[:, 2], 9)).all()
     assert path.method == "continuous" and {f.id for f in path.fits} == {3, 7}
@@ -208,3 +210,13 @@ def test_a_fit_without_a_frequency_leaves_the_lines_alone():
     )
     assert with_lines(plain, one) is plain
     assert not decided(one)
+
+
+def test_a_fit_that_does_not_describe_the_pictures_decides_nothing():
+    one = replace(fit(LineStatus.SUPPORTED), chi2=3624.0)
+    assert not decided(one)
+    row = analysed(one, fine=False).row(7)
+    assert row is not None
+    assert (row.line.status, row.line.probabilities) == ("ambiguous", ())
+    assert row.line.candidates_hz == (5.0, 25.0)
+    assert "misfit" in row.line.reasons[0]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from olivevib.errors import Caution
-from olivevib.reconstruction.continuous import FINER, decided, interval_s
+from olivevib.reconstruction.continuous import DECIDED, FINER, MOST_CHI2, decided, interval_s
 from olivevib.reconstruction.motion import MarkerMotion as FittedMarker
 from olivevib.reconstruction.motion import MotionFit
 from olivevib.signals import Samples
@@ -56,6 +56,7 @@ def with_lines(result: Vibration, fit: MotionFit) -> Vibration:
     """
     if not np.isfinite(fit.f_hz):
         return result
+    fit = _no_surer_than_it_fits(fit)
     markers = {m.id: m for m in fit.markers}
     table = tuple(_row(row, fit, markers.get(row.id)) for row in result.table)
     spectra = {}
@@ -68,6 +69,17 @@ def with_lines(result: Vibration, fit: MotionFit) -> Vibration:
         spectra[quantity] = replace(spectrum, lines=tuple(lines))
     kept = [c for c in result.cautions if c.code not in _CODES]
     return replace(result, table=table, spectra=spectra, cautions=(*kept, *_cautions(fit)))
+
+
+def _no_surer_than_it_fits(fit: MotionFit) -> MotionFit:
+    """The fit; as ambiguous where its best branch does not describe the pictures."""
+    if decided(fit) or fit.status not in DECIDED:
+        return fit
+    why = (
+        f"No motion of one frequency describes the pictures (misfit {fit.chi2:.3g} times their "
+        "scatter): the frequency is not decided."
+    )
+    return replace(fit, status=LineStatus.AMBIGUOUS, reasons=(why,))
 
 
 def _row(row: MarkerMotion, fit: MotionFit, marker: FittedMarker | None) -> MarkerMotion:
@@ -127,6 +139,7 @@ def _frequencies(fit: MotionFit) -> dict[str, Any]:
     frequencies = tuple(float(f) for f in table.f_hz[order])
     chance = tuple(float(p) for p in table.probability[order])
     weighed = fit.status is LineStatus.AMBIGUOUS and bool(np.isfinite(chance).all())
+    weighed = weighed and fit.chi2 <= MOST_CHI2
     return {
         "f_hz": frequencies[0],
         "f_sigma_hz": sigma,

@@ -11,16 +11,22 @@ from olivevib.signals import State
 from olivevib.vibration.types import LineStatus
 
 FINER = 8  # grid points a frame period
+MOST_CHI2 = 3.0
 DECIDED = (LineStatus.DIRECT, LineStatus.CONFIRMED, LineStatus.SUPPORTED)
 
 
 def decided(fit: MotionFit | None) -> bool:
-    """Whether one motion was found that may stand for the record."""
+    """Whether one motion was found that may stand for the record.
+
+    A fit that leaves more than three times the pictures' scatter is not this motion, whatever its
+    branches say of each other.
+    """
     return (
         fit is not None
         and bool(fit.markers)
         and fit.kind in ("steady", "wandering")
         and fit.status in DECIDED
+        and fit.chi2 <= MOST_CHI2
     )
 
 
@@ -45,7 +51,8 @@ def trajectory_of(fit: MotionFit, frames: Trajectory) -> Trajectory:
     """
     rate = 1.0 / float(np.median(np.diff(frames.t_s)))
     grid = fine_grid(fit, rate)
-    outside = (frames.t_s < grid[0]) | (frames.t_s > grid[-1])
+    first, last = frames.sample_t_s.min(axis=1), frames.sample_t_s.max(axis=1)
+    outside = (np.maximum(last, frames.t_s) < grid[0]) | (np.minimum(first, frames.t_s) > grid[-1])
     base = _Rows(frames, outside, grid)
     motion = fit.evaluate(grid)
     fitted = {int(i): k for k, i in enumerate(motion.ids)}
