@@ -145,3 +145,23 @@ def test_an_offset_of_many_milliseconds_is_found_from_sway_and_line():
     assert abs(fit.f_hz - 25.3) < 5e-3
     assert abs(fit.timing.right_offset_s - offset) < 150e-6
     assert not fit.timing.offset_slip
+
+
+def test_a_gain_of_the_blur_scales_amplitudes_and_widens_their_sigma():
+    s = scene(23.7)
+    seen = sight(s, rig(), np.random.default_rng(0))
+    markers = []
+    for m in seen.markers:
+        sides = [replace(v, exposure_s=np.full(v.frame.size, 5e-3)) for v in (m.left, m.right)]
+        markers.append(replace(m, left=sides[0], right=sides[1]))
+    blurred = replace(seen, markers=tuple(markers))
+    known = replace(NEAR, gain=lambda f, e, px: (0.9, 0.02))
+    plain = fit_motion(seen, rig(), anchor_of(s), NEAR)
+    corrected = fit_motion(blurred, rig(), anchor_of(s), known)
+    size = [np.hypot(f.markers[0].cosine[0], f.markers[0].sine[0])[0] for f in (plain, corrected)]
+    assert size[1] / size[0] == pytest.approx(1 / 0.9, rel=2e-3)
+    sigma = corrected.markers[0].amplitude_sigma()[0, 0]
+    assert sigma == pytest.approx(size[1] * 0.02 / 0.9, rel=0.2)
+    refused = fit_motion(blurred, rig(), anchor_of(s), NEAR)
+    assert "exposure" in refused.amplitude_refused
+    assert refused.status is LineStatus.CONFIRMED

@@ -21,6 +21,21 @@ def exposures(observations: Observations) -> tuple[float, float]:
     return out[0], out[1]
 
 
+def gain_shares(
+    observations: Observations, settings: MotionSettings, f_hz: float, amplitude_px: float
+) -> Floats:
+    """(H,) sigma of each harmonic's gain over the gain, the larger of both cameras."""
+    share = np.zeros(settings.harmonics)
+    for exposure in exposures(observations):
+        for h in range(1, settings.harmonics + 1):
+            product = h * f_hz * exposure
+            if settings.gain is not None and FREE < product <= MOST:
+                known = settings.gain(h * f_hz, exposure, amplitude_px)
+                if known is not None:
+                    share[h - 1] = max(share[h - 1], known[1] / known[0])
+    return share
+
+
 def blur_gains(
     observations: Observations, settings: MotionSettings, f_hz: float, amplitude_px: float
 ) -> tuple[Floats, str]:

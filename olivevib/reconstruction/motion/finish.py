@@ -121,6 +121,18 @@ def _marker(
     )
 
 
+def with_gain_sigma(marker: MarkerMotion, share: Floats) -> MarkerMotion:
+    """The marker whose amplitudes are also as unsure as the blur's gains (share (H,) of them)."""
+    if not share.any():
+        return marker
+    covariance = marker.covariance.copy()
+    for h, part in enumerate(share):
+        rows = marker.sway.size + 12 * h + np.arange(12)
+        both = np.concatenate([marker.cosine[h], marker.sine[h]])
+        covariance[np.ix_(rows, rows)] += part**2 * np.outer(both, both)
+    return replace(marker, covariance=covariance)
+
+
 def _inverse(matrix: Floats) -> Floats:
     """Of a symmetric positive matrix with very unlike units."""
     unit = 1 / np.sqrt(np.diag(matrix))

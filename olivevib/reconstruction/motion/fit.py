@@ -12,12 +12,13 @@ from olivevib.geometry import StereoRig
 from olivevib.progress import Tick, silent
 from olivevib.reconstruction.motion import branches as br
 from olivevib.reconstruction.motion.decide import Decision, Facts, decide, keeps_branch
-from olivevib.reconstruction.motion.exposure import blur_gains
+from olivevib.reconstruction.motion.exposure import blur_gains, gain_shares
 from olivevib.reconstruction.motion.finish import (
     degrees_of_freedom,
     markers_of,
     relinearise,
     timing_of,
+    with_gain_sigma,
 )
 from olivevib.reconstruction.motion.free import fit_free
 from olivevib.reconstruction.motion.offset import with_offset
@@ -149,7 +150,11 @@ def band_of(ready: Prepared) -> tuple[float, float]:
 
 def refine(ready: Prepared, model: Model, branch: Branch) -> tuple[Model, Branch]:
     """Linearise about the branch's own motion and settle again."""
-    gain = blur_gains(ready.observations, ready.settings, float(branch.theta[0]), 0.0)[0]
+    largest = max(
+        float(np.linalg.norm(np.hypot(*c.harmonic[0, :, :3]))) for c in branch.coefficients
+    )
+    f, size_px = float(branch.theta[0]), largest * _px_per_mm(ready)
+    gain = blur_gains(ready.observations, ready.settings, f, size_px)[0]
     again = relinearise(model, branch, ready.observations, ready.rig, ready.poses, ready.whites)
     again = replace(with_frequency(again, float(branch.theta[0])), gain=gain)
     return again, settle(again, branch.theta)
@@ -223,10 +228,11 @@ def _result(
     )
     pixel_amplitude = float(np.linalg.norm(facts.amplitude_mm)) * _px_per_mm(ready)
     _, refused = blur_gains(ready.observations, ready.settings, f, pixel_amplitude)
+    share = gain_shares(ready.observations, ready.settings, f, pixel_amplitude)
     psi = model.psi
     return MotionFit(
         kind=kind,
-        markers=tuple(replace(m, blind=decision.blind) for m in markers),
+        markers=tuple(with_gain_sigma(replace(m, blind=decision.blind), share) for m in markers),
         timing=timing,
         branches=facts.table,
         status=decision.status,
