@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from olivevib.report.tables.bodies import deflection_rows, motion_rows, rotation_rows
 from olivevib.report.tables.comparison import comparison_lines, comparison_pairs
 from olivevib.report.tables.markers import (
     candidate_accelerations,
@@ -40,10 +41,12 @@ __all__ = [
     "comparison_lines",
     "comparison_pairs",
     "decay_rows",
+    "deflection_rows",
     "distance_rows",
     "dose_rows",
     "figure_rows",
     "marker_rows",
+    "motion_rows",
     "orbit_rows",
     "outcome_pairs",
     "phase_rows",
@@ -51,6 +54,7 @@ __all__ = [
     "provenance_pairs",
     "record_sections",
     "rig_pairs",
+    "rotation_rows",
     "stage_rows",
     "state_rows",
     "timing_pairs",

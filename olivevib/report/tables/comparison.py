@@ -22,7 +22,25 @@ def comparison_pairs(content: ReportContent, c: Comparison) -> list[Pair]:
         ("rotation, sensor to camera axes", measure(c.rotation_deg, "°", c.rotation_sigma_deg)),
         ("share of the motion that both see", measure(c.coherence, "", digits=4)),
         ("correlation, and at the best rival lag", f"{_r(c.peak)}; {_r(c.second_peak)}"),
+        *_limits(c),
+        *_rival(c),
     ]
+
+
+def _limits(c: Comparison) -> list[Pair]:
+    """95 % limits of agreement of single positions (Bland, Altman), axis by axis."""
+    if not np.isfinite(c.limits_mm).all():
+        return []
+    pairs = zip("xyz", c.limits_mm, c.limits_sigma_mm, strict=True)
+    words = "; ".join(f"{axis} ± {measure(float(v), 'mm', float(s))}" for axis, v, s in pairs)
+    return [("camera less sensor, 95 % limits of agreement", words)]
+
+
+def _rival(c: Comparison) -> list[Pair]:
+    if not c.ambiguous:
+        return []
+    turn = measure(c.rival_turn_deg, "°", digits=3)
+    return [("as good: stamp less trial clock, and turn", f"{seconds(c.rival_offset_s)}; {turn}")]
 
 
 def _r(value: float) -> str:
