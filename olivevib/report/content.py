@@ -100,6 +100,12 @@ class ReportContent:
         return float(spectrum.f_hz[-1]) if spectrum is not None else float("nan")
 
     @property
+    def fold_hz(self) -> float:
+        """Half the frame rate, above which frequencies fold, Hz."""
+        rate = self.recordings.get("left", {}).get("rate_hz")
+        return float(rate) / 2 if isinstance(rate, float) and self.continuous else self.half_rate_hz
+
+    @property
     def survey(self) -> Survey | None:
         """Orbits, decays, transmissibility, deflection shape; None before analyse."""
         return None if self.vibration is None else self.vibration.survey

@@ -22,6 +22,7 @@ from olivevib.trial.summary import summary
 if TYPE_CHECKING:
     from olivevib.trial import Trial
 
+KNOWN_WELL = 5.0  # sigmas of a line that counts in the agreement over all trials
 _FILES = ("video", "stamps", "file", "library")
 _RECORD = ("session", "tree", "machine", "outcome", "markers", "cameras", "accelerometers")
 
@@ -67,7 +68,8 @@ def entry_of(trial: Trial, link: str = "") -> SeasonEntry:
             )
             for c in trial.comparison
             for x in c.lines
-            if x.optical_m_s2 > 0 and x.sensor_m_s2 > 0
+            if x.optical_m_s2 > KNOWN_WELL * x.optical_sigma_m_s2
+            and x.sensor_m_s2 > KNOWN_WELL * x.sensor_sigma_m_s2
         ),
     )  # fmt: skip
 

@@ -75,7 +75,8 @@ def _space(content: ReportContent) -> Iterator[_Job]:
         ))  # fmt: skip
     window, closest = _close(content, ids)
     if window is not None:
-        caption = _CLOSE.format(length=number(window.end_s - window.start_s, 2))
+        each = "instants of the fitted motion" if content.continuous else "single frames"
+        caption = _CLOSE.format(length=number(window.end_s - window.start_s, 2), each=each)
         yield (
             "motion",
             caption,
@@ -140,10 +141,11 @@ def _changing(content: ReportContent, most: Sequence[int]) -> Iterator[_Job]:
 
 def _spectra(content: ReportContent) -> Iterator[_Job]:
     spectrum, names, half = content.displacement, content.names(), content.half_rate_hz
+    fold = content.fold_hz
     if spectrum is None or not spectrum.ids.size:
         return
     if any(line.status in (*KNOWN, *OPEN) for line in spectrum.lines):
-        yield ("frequency", _FREQUENCY, lambda: figures.frequencies(spectrum, names, half))
+        yield ("frequency", _FREQUENCY, lambda: figures.frequencies(spectrum, names, fold))
     ids = _finite_ids(spectrum)
     for group in _groups(ids, ROWS):
         words = _once(_AMPLITUDE + _window_words(spectrum, half), group, ids)
@@ -223,7 +225,7 @@ _MOTION = (
     " start-up, shut-down and decay."
 )
 _CLOSE = (
-    "{length} s of the markers that move most: dots are single frames, the thin grey curve is the"
+    "{length} s of the markers that move most: dots are {each}, the thin grey curve is the"
     " fitted line where its frequency is known."
 )
 _ORBITS = (
