@@ -11,7 +11,7 @@ from test_motion_parts import anchor_of, scene
 from olivevib.reconstruction.motion import Anchor, MotionSettings, fit_motion
 from olivevib.reconstruction.motion.evaluate import phase_of
 from olivevib.studies import blind
-from olivevib.studies.blind_scenes import orbit, rig, sight
+from olivevib.studies.blind_scenes import Scene, orbit, rig, sight
 from olivevib.studies.study import Effort
 from olivevib.vibration.types import LineStatus
 
@@ -165,3 +165,29 @@ def test_a_gain_of_the_blur_scales_amplitudes_and_widens_their_sigma():
     refused = fit_motion(blurred, rig(), anchor_of(s), NEAR)
     assert "exposure" in refused.amplitude_refused
     assert refused.status is LineStatus.CONFIRMED
+
+
+class GrowingScene(Scene):
+    """A shaker whose amplitude grows by a third from start to end."""
+
+    def motion(self, marker, t_s):
+        slow = replace(self, amplitude=np.zeros_like(self.amplitude))
+        own = Scene.motion(self, marker, t_s) - Scene.motion(slow, marker, t_s)
+        size = 1 + 0.3 * (t_s / self.span_s - 0.5)
+        return Scene.motion(slow, marker, t_s) + size[..., None] * own
+
+
+def test_a_growing_amplitude_is_followed():
+    s = GrowingScene(**vars(scene(25.3)))
+    _, fit = fitted(s, settings=NEAR)
+    assert fit.status is LineStatus.CONFIRMED
+    assert fit.growth == pytest.approx(0.15, abs=0.02)
+    assert fit.chi2 < 1.3
+    at = np.linspace(0.2, 3.8, 300)
+    error = fit.evaluate(at).xyz_mm[:, 0] - s.motion(0, at)[:, :3]
+    error -= error.mean(axis=0)
+    assert error[:, :2].std() < 0.04
+    e = 1e-4
+    bend = (s.motion(0, at + e) - 2 * s.motion(0, at) + s.motion(0, at - e))[:, :3] / e**2 * 1e-3
+    difference = fit.evaluate(at).acceleration_m_s2[:, 0] - bend
+    assert difference[:, :2].std() < 0.02 * np.abs(bend).max()

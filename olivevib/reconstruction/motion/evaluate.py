@@ -52,7 +52,9 @@ def _harmonics(fit: MotionFit, m: MarkerMotion, t_s: Floats) -> tuple[Floats, Fl
         turned = h * (cos * S - sin * C)
         rate = rate + omega * turned
         bend = bend + alpha * turned - (h * omega) ** 2 * (cos * C + sin * S)
-    return value, rate, bend
+    slope = 2 * fit.growth / (fit.end_s - fit.start_s)
+    size = 1 + slope * (t_s - fit.mid_s)[:, None]
+    return size * value, size * rate + slope * value, size * bend + 2 * slope * rate
 
 
 def _marker(fit: MotionFit, m: MarkerMotion, t_s: Floats) -> tuple[Floats, ...]:
@@ -103,7 +105,8 @@ def _harmonic_factors(fit: MotionFit, m: MarkerMotion, t_s: Floats, derivative: 
         return out
     phi, omega, _ = phase_of(fit, t_s)
     for h in range(1, h_count + 1):
-        factor = np.ones_like(t_s) if derivative == 0 else -((h * omega) ** 2)
+        size = 1 + 2 * fit.growth * (t_s - fit.mid_s) / (fit.end_s - fit.start_s)
+        factor = size if derivative == 0 else -size * (h * omega) ** 2
         cos, sin = np.cos(h * phi) * factor, np.sin(h * phi) * factor
         by_phase = h * 2 * np.pi * (t_s - fit.mid_s)
         C, S = m.cosine[h - 1], m.sine[h - 1]

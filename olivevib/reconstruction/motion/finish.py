@@ -15,6 +15,7 @@ from olivevib.reconstruction.motion.solve import (
     Branch,
     Coefficients,
     Model,
+    envelope,
     marginal,
     reduce,
 )
@@ -28,8 +29,10 @@ def motion_at(model: Model, problem: Problem, branch: Branch, own: Coefficients)
     t_s = problem.times(model.clock(branch.theta))
     phi, _ = model.phase(branch.theta, t_s)
     xi = model.knots.values(own.sway, t_s)
+    size = envelope(model, t_s)[..., None]
     for k, (cosine, sine) in enumerate(own.harmonic, start=1):
-        xi = xi + np.cos(k * phi)[..., None] * cosine + np.sin(k * phi)[..., None] * sine
+        turn = np.cos(k * phi)[..., None] * cosine + np.sin(k * phi)[..., None] * sine
+        xi = xi + size * turn
     return np.asarray(xi)
 
 

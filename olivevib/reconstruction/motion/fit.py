@@ -40,7 +40,7 @@ from olivevib.reconstruction.motion.types import (
     MotionSettings,
     Observations,
 )
-from olivevib.reconstruction.motion.wander import pace_of, weigh_paces
+from olivevib.reconstruction.motion.wander import Growth, growth_of, pace_of, weigh_paces
 
 WORSE = 1.3  # noise or chi2 above which a wandering speed is looked for
 
@@ -84,9 +84,11 @@ def fit_motion(
     model, best = refine(ready, ready.model, weighed.branches[0])
     kind, fast = "steady", 0.0
     if chi2_of(model, best) > WORSE or ready.pixels.scale > WORSE:
-        knot = ready.pixels.knot_s
-        pace = pace_of(observations, knot, (ready.start_s, ready.end_s), ready.pixels.peaks_hz[0])
-        if pace is not None and pace.gain > WORSE:
+        span, knot = (ready.start_s, ready.end_s), ready.pixels.knot_s
+        peak = ready.pixels.peaks_hz[0]
+        pace = pace_of(observations, knot, span, peak)
+        grown = growth_of(observations, knot, span, peak)
+        if pace is not None and pace.gain > max(WORSE, grown.gain):
             fast = pace.ridge.fastest_hz_s
             again = prepare(observations, rig, clock, settings, pace.phase)
             rate = observations.frame_rate_hz
@@ -94,6 +96,10 @@ def fit_motion(
             if followed is not None:
                 ready, kind, weighed = again, "wandering", followed[1]
                 model, best = refine(ready, followed[0], weighed.branches[0])
+        elif grown.gain > WORSE:
+            ready = growing(ready, grown)
+            weighed = br.weigh(ready.model, candidates, ready.offset_sigma_s, tick)
+            model, best = refine(ready, ready.model, weighed.branches[0])
     return finished(ready, (model, best), weighed, kind, fast)
 
 
@@ -103,9 +109,10 @@ def prepare(
     anchor: Anchor,
     settings: MotionSettings,
     phase: Callable[[Floats], Floats] | None = None,
+    size: Callable[[Floats], Floats] | None = None,
 ) -> Prepared:
-    """Pixels, poses and the linear problem about the sway; phase: of a wandering line."""
-    pixels = look(observations, settings.knot_s, settings.harmonics, phase)
+    """Pixels, poses and the linear problem about the sway; phase, size: of an uneven line."""
+    pixels = look(observations, settings.knot_s, settings.harmonics, phase, size)
     searched, found = with_offset(observations, rig, anchor, settings, pixels)
     clock, knots, start, end = layout(observations, searched, settings, pixels.knot_s)
     poses, problems, whites = about_sway(
@@ -127,6 +134,12 @@ def prepare(
         offset_sigma_s=sigma,
         offset_found=found,
     )
+
+
+def growing(ready: Prepared, grown: Growth) -> Prepared:
+    """Everything prepared again for an amplitude that grows evenly."""
+    again = prepare(ready.observations, ready.rig, ready.anchor, ready.settings, None, grown.size)
+    return replace(again, model=replace(again.model, growth=grown.share))
 
 
 def candidate_frequencies(ready: Prepared) -> Floats:
@@ -250,6 +263,7 @@ def _result(
         psi=theta[5:] if psi is not None else np.empty(0),
         psi_first_s=psi.first_s if psi is not None else 0.0,
         psi_knot_s=psi.step_s if psi is not None else 0.5,
+        growth=model.growth,
         amplitude_refused=refused,
     )
 

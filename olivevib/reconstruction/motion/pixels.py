@@ -45,10 +45,12 @@ def look(
     knot_s: float | None,
     harmonics: int,
     phase: Callable[[Floats], Floats] | None = None,
+    size: Callable[[Floats], Floats] | None = None,
 ) -> Pixels:
     """Choose the knots, scan the apparent frequency, measure the noise.
 
-    phase: of a line whose speed wanders, else the strongest steady line is taken out.
+    phase: of a line whose speed wanders, else the strongest steady line is taken out; size: its
+    slowly changing amplitude, else even.
     """
     views = views_of(observations)
     span = max(float(np.ptp(v.row_zero_s)) for v in views)
@@ -60,7 +62,7 @@ def look(
         power, bases = _scan(views, step, f)
         peaks = _peaks(f, power, 2.0 / span)
         noise = tuple(
-            _noise(v, Q, _phase(v, peaks, phase), harmonics)
+            _noise(v, Q, _phase(v, peaks, phase), harmonics, size)
             for v, Q in zip(views, bases, strict=True)
         )
         trials.append((step, power, peaks, noise))
@@ -128,13 +130,20 @@ def _phase(
     return np.asarray(2 * np.pi * peaks[0] * (t - t.mean()))
 
 
-def _noise(v: Sightings, Q: Floats, phase: Floats | None, harmonics: int) -> tuple[Floats, float]:
+def _noise(
+    v: Sightings,
+    Q: Floats,
+    phase: Floats | None,
+    harmonics: int,
+    size: Callable[[Floats], Floats] | None,
+) -> tuple[Floats, float]:
     """Covariance of a frame's pixels left by spline and lines, blended with the localiser's."""
     n = v.row_zero_s.size
     columns = [Q]
+    even = np.ones(n) if size is None else size(v.row_zero_s)
     if phase is not None:
         for h in range(1, harmonics + 1):
-            columns.append(np.column_stack([np.cos(h * phase), np.sin(h * phase)]))
+            columns.append(even[:, None] * np.column_stack([np.cos(h * phase), np.sin(h * phase)]))
     basis = np.linalg.qr(np.column_stack(columns))[0]
     y = v.px.reshape(n, -1)
     r = y - basis @ (basis.T @ y)

@@ -33,6 +33,7 @@ class Model:
 
     prior: theta0 (Q,) with precision (Q, Q); active (Q,): the rest stays at theta0. Q = 5 + J, J
     coefficients of the phase spline on ``psi``. precision_sway, precision_harmonic (6,).
+    growth: share by which all amplitudes grow from the middle to the end.
     gain (2, H): what the blur leaves of each harmonic in the left and right camera.
     """
 
@@ -46,6 +47,7 @@ class Model:
     precision_harmonic: Floats
     gain: Floats
     psi: Knots | None = None
+    growth: float = 0.0
 
     @property
     def harmonics(self) -> int:
@@ -101,8 +103,15 @@ class Reduced:
 
 
 def gains(model: Model, problem: Problem) -> Floats:
-    """(N, H)."""
-    return np.asarray(np.where(problem.right[:, None], model.gain[1], model.gain[0]))
+    """(N, H) what the blur leaves of each harmonic, times the slow growth of the amplitude."""
+    blur = np.where(problem.right[:, None], model.gain[1], model.gain[0])
+    return np.asarray(blur * envelope(model, problem.zero_s)[:, None])
+
+
+def envelope(model: Model, t_s: Floats) -> Floats:
+    """1 in the middle, growing evenly by ``growth`` to the end."""
+    half = 0.5 * model.knots.step_s * (model.knots.count - ORDER + 1)
+    return np.asarray(1.0 + model.growth * (t_s - model.mid_s) / half)
 
 
 def gained(columns: Floats, gain: Floats) -> Floats:
