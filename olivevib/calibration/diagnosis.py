@@ -95,13 +95,14 @@ def diagnose(
         tick(k, steps, what)
         views = _views(board, frames, look, reader)
         attempts.append(Attempt(what, len(views), len(frames)))
-        if len(views) >= max(1, ENOUGH * len(frames)):
+        enough = len(views) >= max(1, ENOUGH * len(frames))
+        if enough and _carries(board, frames, look):
             return _found(cause, board, views, attempts)
     few = frames[:: max(1, len(frames) // 5)]
     if board.dictionary:
         for search in (_other_counts, _other_dictionary):
             tick(steps - 2, steps, "looking for other boards")
-            told = search(board, few, attempts)
+            told = search(board, frames if search is _other_counts else few, attempts)
             if told is not None:
                 return told
     elif reader is not None:
@@ -133,6 +134,15 @@ def _views(
     return [view for view in seen if view is not None]
 
 
+def _carries(board: Board, frames: Sequence[Grey], look: Look) -> bool:
+    """Whether the markers lie where a grid carries them; other boards are told by their corners."""
+    if board.kind != "arucogrid":
+        return True
+    readings = _readings(board, board.dictionary, frames, look)
+    seen = sum(image.id.size for image in readings)
+    return sum(agreement(board, image) for image in readings) >= 0.5 * seen
+
+
 def roll_deg(views: Sequence[BoardView]) -> float:
     """By how much the board stands turned in the image, degrees: the middle of all views."""
     ends = []
@@ -148,7 +158,7 @@ def _lying(views: Sequence[BoardView]) -> str:
     """Words where the board lies on its side in most views: the camera may be mounted so."""
     roll = abs(roll_deg(views))
     return (
-        " The board lies on its side: the camera is turned by 90 degrees."
+        " The board lies on its side: unless it was held so, the camera is turned by 90 degrees."
         if 60 < roll < 120
         else ""
     )
@@ -161,6 +171,8 @@ def _found(
     share = f"in {last.found} of {last.of} frames"
     side = _lying(views)
     turned_board = replace(board, inverted=not board.inverted)
+    word = "not inverted" if board.inverted else "inverted (white on black)"
+    also = f" The print is {word} as well." if "inverted" in last.what else ""
     told: dict[str, tuple[str, str, Board | None]] = {
         "sound": (f"The board was found {share} as declared.{side}", "", board),
         "inverted": (
@@ -171,7 +183,7 @@ def _found(
         ),
         "mirrored": (
             f"The video is mirrored: no board as it is, but {share} after exchanging left and "
-            f"right.{side}",
+            f"right.{also}{side}",
             "Switch the mirror of the webcam's software off and record again, or flip the file; "
             "the trial of this camera is mirrored too.",
             turned_board if "inverted" in last.what else board,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import cv2
 import numpy as np
@@ -75,8 +76,11 @@ def rebuild(board: Board, images: Sequence[Markers]) -> tuple[Board, int] | None
     if not ids or board.kind not in ("charuco", "arucogrid"):
         return None
     best: tuple[Board, int] | None = None
-    for columns in COUNTS:
-        for trial in _boards(board, columns, int(np.median(ids))):
+    seen, counts = np.unique(np.concatenate([image.id for image in images]), return_counts=True)
+    often = seen[counts >= 2]
+    lasts = {int(np.median(ids)), int(often.max())} if often.size else {int(np.median(ids))}
+    for columns, last in product(COUNTS, sorted(lasts)):
+        for trial in _boards(board, columns, last):
             score = sum(agreement(trial, image) for image in images)
             if score > 0 and (best is None or score > best[1]):
                 best = (trial, score)

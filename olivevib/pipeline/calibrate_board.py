@@ -78,7 +78,7 @@ def _not_found(trial: Trial, board: Board, recording: BoardRecording) -> InputEr
         f"the {recording.side} calibration ({recording.path.name}) shows the {board.name} in "
         f"{count} of {recording.frames} frames.",
         finding.text,
-        finding.remedy,
+        finding.remedy.replace("--board ", "--set calibration.board="),
     )
 
 

@@ -41,8 +41,10 @@ BENCHMARKS: tuple[Entry, ...] = (
     Entry("blind", "frequency above the frame rate: verdict against truth, blind", "blind:run"),
     Entry("capture", "what the recorder loses, and what its checksums find", "capture.study:run"),
     Entry("calibration", "accuracy and time beside cv2", "calibration.peer:run"),
+    Entry("calibration-boards", "boards of others, single markers", "calibration.foreign:run"),
     Entry("calibration-centres", "centres of coded markers", "calibration.centres:run"),
     Entry("calibration-faults", "twelve seeded faults, false alarms", "calibration.faults:run"),
+    Entry("calibration-honesty", "sigmas against what is observed", "calibration.honesty:run"),
     Entry("calibration-webcams", "four webcams: unused frames, latency", "calibration.webcams:run"),
     Entry("detection", "all of the detection-… studies", "detection.everything:run"),
     Entry("detection-rates", "markers found by size and tilt, beside peers", "detection.rates:run"),
@@ -54,6 +56,7 @@ BENCHMARKS: tuple[Entry, ...] = (
     Entry("detection-clutter", "false markers in leaf clutter", "detection.clutter:run"),
     Entry("detection-speed", "CPU time of a full scan, beside peers", "detection.speed:run"),
     Entry("exposure", "what the exposure takes from an amplitude", "exposure:run"),
+    Entry("timing", "frequency, motion and clocks above the frame rate, rendered", "timing:run"),
     Entry("report", "time and size of reports and exports", "seasons.report:run"),
     Entry("vibration", "lines, conversion, damping, comparison, import, cost", "vibration:run"),
 )

@@ -226,7 +226,7 @@ def _scene(trial: Trial, rig: StereoRig) -> RigScene:
     if path is not None:
         seen = np.asarray(np.isfinite(path.xyz_mm).all(axis=2))
         count = np.maximum(1, seen.sum(axis=0))[:, None]
-        means = np.where(seen[:, :, None], path.xyz_mm, 0.0).sum(axis=0) / count
+        means = np.where(seen[:, :, None], path.left_camera_mm, 0.0).sum(axis=0) / count
         points = means[np.asarray(seen.any(axis=0))]
     told = "; dots: markers" if len(points) else ""
     return RigScene(tuple(stands), points, f"{camera_places(R, t)[0]}{told}")
