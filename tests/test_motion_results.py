@@ -8,6 +8,7 @@ import pytest
 
 from olivevib.files.store import StageFile
 from olivevib.pipeline.fitted import with_lines
+from olivevib.pipeline.row_time import BoardRowTime
 from olivevib.reconstruction.continuous import decided, stored_fit, trajectory_of
 from olivevib.reconstruction.motion import (
     Anchor,
@@ -19,7 +20,10 @@ from olivevib.reconstruction.motion import (
 )
 from olivevib.reconstruction.trajectory import Trajectory
 from olivevib.signals import Samples, State
+from olivevib.trial.camera_book import BOARD, CameraMode, Entry
 from olivevib.trial.records.motion import motion_columns, motion_from, motion_text
+from olivevib.trial.records.tracks import CameraRecord, StoredTracks, tracks_file, tracks_from
+from olivevib.trial.stages import Fingerprint
 from olivevib.vibration import LineStatus, SamplingFacts, analyse
 
 F_HZ, KNOTS, H = 25.0, 12, 2
@@ -220,3 +224,28 @@ def test_a_fit_that_does_not_describe_the_pictures_decides_nothing():
     assert (row.line.status, row.line.probabilities) == ("ambiguous", ())
     assert row.line.candidates_hz == (5.0, 25.0)
     assert "misfit" in row.line.reasons[0]
+
+
+def test_tracks_keep_the_clock_fit_of_every_frame():
+    stamps = np.array([0.0, 0.0331, nan, 0.1002])
+    camera = CameraRecord(
+        *("left.nut", "mjpeg", (64, 48), 3, 1, 0, "container", "line"),
+        *(30.0, 0.01, 1e-4, 2e-4, 2.8e-5, 5e-7, "led"),
+    )
+    fitted = np.arange(4) / 30
+    both = {"left": camera, "right": camera}
+    stored = StoredTracks(
+        *((), (), both, dict.fromkeys(both, stamps), (), "template", ()),
+        fitted_s=dict.fromkeys(both, fitted),
+    )
+    back = tracks_from(tracks_file(stored, Fingerprint({}, {})))
+    np.testing.assert_array_equal(back.fitted_s["right"], fitted)
+    np.testing.assert_array_equal(back.stamp_s["left"], stamps)
+    assert back.cameras["left"].row_time_source == "led"
+
+
+def test_a_waved_board_tells_row_times_and_the_book_keeps_their_source():
+    entry = Entry(CameraMode("S1", (1280, 720), 30.0), 27.8, 0.3, f"{BOARD} of T04")
+    told = BoardRowTime("left", entry)
+    assert "readout 20.02 ms" in told.words and entry.kind == "board"
+    assert replace(entry, source="lamp at 500 Hz, 13.5 stripes").kind == "led"

@@ -69,6 +69,7 @@ def stored_tracks(
         right=tracks["right"],
         cameras={side: _record(trial, recorded[side]) for side in SIDES},
         stamp_s={side: _with_drops(recorded[side]) for side in SIDES},
+        fitted_s={side: _by_the_fit(recorded[side].fit) for side in SIDES},
         stray_ids=strays,
         localiser=", ".join(localisers),
         cautions=notes + counts + _cautions(list(recorded.values()), ids, declared),
@@ -142,6 +143,11 @@ def _record(trial: Trial, camera: _Recorded) -> CameraRecord:
         row_time_sigma_s=row_time_sigma,
         row_time_source=source,
     )
+
+
+def _by_the_fit(fit: StampFit) -> Floats:
+    """The stamp of every frame count by the clock fit, also of those that were dropped."""
+    return np.interp(np.arange(int(fit.sequence[-1]) + 1), fit.sequence, fit.t_s)
 
 
 def _with_drops(camera: _Recorded) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -50,7 +50,10 @@ class CameraRecord:
 
 @dataclass(frozen=True)
 class StoredTracks:
-    """What tracks.h5 holds. stamp_s: raw stamp of each frame count, NaN where dropped."""
+    """What tracks.h5 holds. stamp_s: raw stamp of each frame count, NaN where dropped.
+
+    fitted_s: the same by the clock fit, on the stamps' own clock, dropped counts included.
+    """
 
     left: tuple[Track, ...]
     right: tuple[Track, ...]
@@ -59,6 +62,7 @@ class StoredTracks:
     stray_ids: tuple[int, ...]
     localiser: str
     cautions: tuple[Caution, ...]
+    fitted_s: Mapping[str, Floats] = field(default_factory=dict)
 
     def of(self, side: str) -> tuple[Track, ...]:
         """The tracks of "left" or "right"."""
@@ -70,6 +74,10 @@ def tracks_file(stored: StoredTracks, now: Fingerprint) -> StageFile:
     variables: dict[str, Variable] = {}
     for side in SIDES:
         variables |= _side(side, stored.of(side), stored.stamp_s[side])
+        if side in stored.fitted_s:
+            variables[f"{side}/stamp_fit"] = Variable(
+                ("frame",), stored.fitted_s[side], "s", "stamp by the clock fit; own clock"
+            )
     return StageFile(
         stage=STAGE.name,
         schema=STAGE.schema,
@@ -131,6 +139,11 @@ def tracks_from(file: StageFile) -> StoredTracks:
         stamp_s={
             s: floats("stamp_s", file.variables[f"{s}/stamp"].values, (None,), nan=True)
             for s in SIDES
+        },
+        fitted_s={
+            s: floats("stamp_fit", file.variables[f"{s}/stamp_fit"].values, (None,))
+            for s in SIDES
+            if f"{s}/stamp_fit" in file.variables
         },
         stray_ids=tuple(json.loads(str(file.attributes["stray_ids"]))),
         localiser=localiser,
