@@ -122,6 +122,9 @@ def frequency(m: dict[str, Any]) -> str:
     if status == "blind" or not candidates:  # candidates of sway are no frequencies
         return str(status)
     shown = [f"{f:.2f}" for f in candidates[:CANDIDATES_SHOWN]]
+    chances = m.get("frequency_probabilities") or []
+    if len(chances) == len(candidates):
+        shown = [f"{f} ({100 * p:.0f} %)" for f, p in zip(shown, chances, strict=False)]
     more = ", …" if len(candidates) > CANDIDATES_SHOWN else ""
     return f"{status}: {', '.join(shown)}{more} Hz"
 

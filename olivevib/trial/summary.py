@@ -11,6 +11,7 @@ import numpy as np
 
 from olivevib.comparison import Comparison
 from olivevib.errors import Caution
+from olivevib.reconstruction.continuous import decided
 from olivevib.trial.survey_summary import known, sensor_summary, vibration_summary
 from olivevib.vibration import LineStatus, MarkerMotion
 
@@ -76,8 +77,24 @@ def _timing(trial: Trial) -> dict[str, Any]:
             "stamp_jitter_s": camera.jitter_s if camera else None,
             "dropped": camera.dropped if camera else None,
             "frames": camera.frames if camera else None,
-        }
+        } | _fitted_row_time(trial, side)
     return out
+
+
+def _fitted_row_time(trial: Trial, side: str) -> dict[str, Any]:
+    """The row time as the trial itself shows it, where the fit decided; its anchor beside it."""
+    fit = trial.reconstruction.motion if trial.reconstruction else None
+    if fit is None or not decided(fit):
+        return {}
+    name = f"{side}_row_time_s"
+    sigma = fit.timing.sigma(name)
+    if sigma == 0:
+        return {}
+    return {
+        "row_time_s": getattr(fit.timing, name),
+        "row_time_sigma_s": known(sigma),
+        "source": f"fit, from {fit.anchor.row_time_source}",
+    }
 
 
 def _markers(trial: Trial) -> list[dict[str, Any]]:
@@ -106,6 +123,8 @@ def _motion(row: MarkerMotion | None) -> dict[str, Any]:
             "frequency_sigma_hz": None,
             "frequency_status": None,
             "frequency_candidates_hz": [],
+            "frequency_probabilities": [],
+            "frequency_reasons": [],
             "amplitude_mm": unknown,
             "amplitude_sigma_mm": unknown,
             "acceleration_rms_m_s2": None,
@@ -121,6 +140,8 @@ def _motion(row: MarkerMotion | None) -> dict[str, Any]:
         "frequency_clock_sigma_hz": known(line.f_clock_sigma_hz) if decided else None,
         "frequency_status": line.status.value,
         "frequency_candidates_hz": [float(f) for f in line.candidates_hz],
+        "frequency_probabilities": [float(p) for p in line.probabilities],
+        "frequency_reasons": list(line.reasons),
         "amplitude_mm": _axes(line.amplitude),
         "amplitude_sigma_mm": _axes(line.amplitude_sigma),
         "acceleration_rms_m_s2": known(row.acceleration_rms_m_s2),
