@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass
+from itertools import islice
 
 from olivevib.files.accelerometer.cells import Dialect
 from olivevib.files.accelerometer.units import parse_unit
 
 SNIFF_BYTES = 65536
 COMMENTS = ("#", ";", "%", "//", "'")
+_MAY_BE_COMMENT = "#;% \t"
 _DIALECTS = (
     *(Dialect(s, ".") for s in ("\t", ";", ",", "|")),
     *(Dialect(s, ",") for s in ("\t", ";", "|", ",")),
@@ -70,7 +72,8 @@ def sniff(
     of one width; the header is what stands before the first such row.
     """
     hints = _hints(lines)
-    tail = [x for x in lines if x.strip() and not x.lstrip().startswith(COMMENTS)][-200:]
+    cells = (x for x in reversed(lines) if x.strip() and not x.lstrip().startswith(COMMENTS))
+    tail = list(islice(cells, 200))[::-1]
     if not tail:
         return None
     sample = tail[-1 :: -max(1, len(tail) // 30)]
@@ -145,8 +148,9 @@ def _layout(lines: list[str], encoding: str, dialect: Dialect, tail: list[str]) 
     names, units, used = _header(above, dialect, width, len(kinds.rstrip("b")))
     metadata = _metadata([x for k, x in enumerate(above) if k not in used], dialect)
     metadata += tuple(("header mark", above[k].lstrip()[:1]) for k in sorted(used)[:1])
-    marks = [x.lstrip()[0] for x in lines[first:] if x.lstrip().startswith(("#", ";", "%"))]
-    comment = marks[0] if marks and marks[0] != dialect.separator else ""
+    begun = (x.lstrip()[:1] for x in lines[first:] if x[:1] in _MAY_BE_COMMENT)
+    mark = next((c for c in begun if c and c in "#;%"), "")
+    comment = "" if mark == dialect.separator else mark
     padded = any(cell[:1] == " " for row in rows for cell in row[1:])
     return TextLayout(encoding, dialect, first, kinds, names, units, metadata, comment, padded)
 
@@ -163,10 +167,10 @@ def _column_kinds(rows: list[str], width: int) -> str:
 
 def _first_row(lines: list[str], dialect: Dialect, kinds: str) -> int:
     """The first line that has the columns' kinds and is followed by another one (or the end)."""
-    filled = [k for k, line in enumerate(lines) if line.strip()]
-    for at, k in enumerate(filled):
-        if _is_row(dialect.kinds(dialect.split(lines[k])), kinds):
-            following = [dialect.kinds(dialect.split(lines[n])) for n in filled[at + 1 : at + 4]]
+    for k, line in enumerate(lines):
+        if line.strip() and _is_row(dialect.kinds(dialect.split(line)), kinds):
+            after = islice((x for x in islice(lines, k + 1, None) if x.strip()), 3)
+            following = [dialect.kinds(dialect.split(x)) for x in after]
             if not following or any(_is_row(found, kinds) for found in following):
                 return k
     return len(lines)
