@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from olivevib.arrays import Floats, Grey
+from olivevib.detection.bend import Bend
 from olivevib.detection.refine import Fit, Pixels, Singles, approach, fit_template, marker_pixels
 from olivevib.detection.template import COARSE, REACH, Blur, draw_template, module_px
 from olivevib.detection.uneven import closed_light, template_light
@@ -31,11 +32,12 @@ SHARP = Blur()  # of a good lens in focus
 
 @dataclass(frozen=True)
 class CardFit:
-    """A fitted marker with the blur it has, and whether its light had to be evened out."""
+    """A fitted marker with its blur, whether its light had to be evened out, and how it is bent."""
 
     fit: Fit
     blur: Blur
     uneven: bool = False
+    bend: Bend | None = None
 
 
 def fit_card(
@@ -71,7 +73,7 @@ def _fine(
     """Draw where the marker was found and fit all pixels; once more if the blur was other."""
     one = None
     for _ in range(2):
-        pixels = _blurred_pixels(grey, H, blur, layout)
+        pixels = blurred_pixels(grey, H, blur, layout)
         fit = pixels and fit_template(draw_template(white, H, blur, layout.quiet), pixels)
         if not fit:
             return None
@@ -86,7 +88,7 @@ def _fine(
 def _moving(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit) -> CardFit:
     """The same marker with a motion path where its blur is longer than wide; ``one`` if not."""
     H, blur = one.fit.H, one.blur
-    pixels = _blurred_pixels(grey, H, blur, layout)
+    pixels = blurred_pixels(grey, H, blur, layout)
     template = draw_template(white, H, blur, layout.quiet, moments=True)
     fit = pixels and fit_template(template, pixels)
     if not fit:
@@ -97,7 +99,7 @@ def _moving(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit) -> C
         if moving.path_px == 0:
             return best
         H = fit.H
-        pixels = _blurred_pixels(grey, H, moving, layout)
+        pixels = blurred_pixels(grey, H, moving, layout)
         fit = pixels and fit_template(draw_template(white, H, moving, layout.quiet), pixels)
         if not fit:
             return best
@@ -116,8 +118,8 @@ def _even(
     found = approach(coarse, closed_light(grey, pixels, side), EVENED_NCC)
     if found is None:
         return None
-    H, blur = found[0], _rounder(blur, found[1])
-    raw = _blurred_pixels(grey, H, blur, layout)
+    H, blur = found[0], rounder(blur, found[1])
+    raw = blurred_pixels(grey, H, blur, layout)
     if raw is None:
         return None
     even = closed_light(grey, raw, side)
@@ -126,7 +128,7 @@ def _even(
         fit = fit_template(draw_template(white, H, blur, layout.quiet), even)
         if fit is None or not plausible(fit.H, layout, grey.shape):
             return None
-        H, blur = fit.H, _rounder(blur, fit.further)
+        H, blur = fit.H, rounder(blur, fit.further)
         even = template_light(raw, fit.image, fit.weights, side)
     assert fit is not None
     return CardFit(replace(fit, covariance=UNEVEN_VARIANCE * fit.covariance), blur, uneven=True)
@@ -151,7 +153,7 @@ def plausible(H: Floats, layout: MarkerLayout, shape: tuple[int, ...]) -> bool:
     )
 
 
-def _blurred_pixels(grey: Grey, H: Floats, blur: Blur, layout: MarkerLayout) -> Pixels | None:
+def blurred_pixels(grey: Grey, H: Floats, blur: Blur, layout: MarkerLayout) -> Pixels | None:
     """All pixels of the marker that nothing beyond its card is smeared into; None if H is wild."""
     if not plausible(H, layout, grey.shape):
         return None
@@ -159,12 +161,13 @@ def _blurred_pixels(grey: Grey, H: Floats, blur: Blur, layout: MarkerLayout) -> 
     return marker_pixels(grey, H, layout.modules, reach_modules=reach)
 
 
-def _rounder(blur: Blur, further: Floats) -> Blur:
+def rounder(blur: Blur, further: Floats) -> Blur:
+    """A blur whose variance is larger by the first of ``further``, as far as it is believed."""
     return replace(blur, variance_px2=_believed(blur.variance_px2 + float(further[0])))
 
 
 def _further(blur: Blur, further: Floats) -> Blur:
-    return _longer(blur, further) if further.size == 2 else _rounder(blur, further)
+    return _longer(blur, further) if further.size == 2 else rounder(blur, further)
 
 
 def _longer(blur: Blur, further: Floats) -> Blur:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 
 from olivevib.arrays import Grey
+from olivevib.detection.bend import Wrapped
 from olivevib.detection.detection import Detection, Reader
 from olivevib.detection.follow import Follower
 from olivevib.detection.foreign import ForeignReader
@@ -19,12 +20,23 @@ class Detector:
 
     library: the paper's layout ("olive"), or a foreign family read through OpenCV.
     settings: the paper's parameters, and ``mode``; foreign families know no parameters.
+    wrapped: which markers are wrapped round a branch (default mode of the paper's layout).
     """
 
-    def __init__(self, library: MarkerLibrary, settings: DetectionSettings | None = None) -> None:
+    def __init__(
+        self,
+        library: MarkerLibrary,
+        settings: DetectionSettings | None = None,
+        wrapped: Sequence[Wrapped] = (),
+    ) -> None:
         self.library = library
         self.settings = settings or DetectionSettings()
-        self._reader = _READERS[library.family](library, self.settings)
+        if library.family != "olive":
+            self._reader: Reader = ForeignReader(library)
+        elif self.settings.mode == "paper":
+            self._reader = PaperReader(library, self.settings)
+        else:
+            self._reader = TemplateReader(library, self.settings, wrapped)
 
     def detect(self, grey: Grey) -> list[Detection]:
         """All markers in ``grey`` (H, W) uint8, sorted by id; ValueError for other arrays."""
@@ -42,19 +54,3 @@ class Detector:
         if isinstance(self._reader, PaperReader | TemplateReader):
             return self._reader.mirrored_ids(grey)
         return ()
-
-
-def _olive(library: MarkerLibrary, settings: DetectionSettings) -> Reader:
-    reader = PaperReader if settings.mode == "paper" else TemplateReader
-    return reader(library, settings)
-
-
-def _foreign(library: MarkerLibrary, settings: DetectionSettings) -> Reader:
-    return ForeignReader(library)
-
-
-_READERS: dict[str, Callable[[MarkerLibrary, DetectionSettings], Reader]] = {
-    "olive": _olive,
-    "aruco": _foreign,
-    "apriltag": _foreign,
-}

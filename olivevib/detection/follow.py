@@ -235,7 +235,8 @@ def _after(one: Found) -> Known:
     fit, blur = one.card.fit, one.card.blur
     noise = np.asarray(fit.noise / max(float(fit.noise.max()), 1e-9), dtype=np.float32)
     smeared = blur.path_px > LEAST_PATH_PX
-    drawn_at = None if smeared or one.card.uneven or one.inverted else one.H
+    alone = smeared or one.card.uneven or one.inverted or one.card.bend is not None
+    drawn_at = None if alone else one.H
     return Known(one.H, blur, noise, drawn_at, blur)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from olivevib.arrays import Floats, Grey
 from olivevib.detection.noise import noise_covariance
-from olivevib.detection.template import REACH, Template
+from olivevib.detection.template import REACH, Blur, Template
 from olivevib.geometry import apply_homography
 
 Singles = NDArray[np.float32]
@@ -27,6 +27,8 @@ MOST_COLUMNS = 32000  # that cv2.remap takes in one row
 CLEAR = 0.5  # weight above which a pixel counts as not covered
 MOVED_PX = 0.02  # a pass that moves no cornerstone farther is the last: the next is quadratic
 PASSES = 8
+LEAST_SHARE = 0.15  # of the contrast at the centre that is left anywhere
+LIGHT_ROUNDS = 6  # of robust weights and light in turn
 
 
 @dataclass(frozen=True)
@@ -119,11 +121,16 @@ def marker_pixels(
 
 @dataclass
 class _State:
-    """Unknowns in the passes: W (3, 3), light (o, ox, oy, g, gx, gy), blur (S,)."""
+    """Unknowns in the passes: W (3, 3), light (o, ox, oy, g, gx, gy), blur (S,).
+
+    spread (2, 2): covariance of the blur, px², in units of the pixels' scale: light falls on the
+    marker before it is blurred.
+    """
 
     W: Floats
     light: Floats
     further: Floats
+    spread: Floats
 
 
 @dataclass(frozen=True)
@@ -171,6 +178,7 @@ def fit_template(template: Template, pixels: Pixels) -> Fit | None:
     whitened = np.asarray(end.residual * np.sqrt(pixels.trust), dtype=np.float32)
     rms = float(np.sqrt((whitened[clear] ** 2).sum() / (clear.sum() - unknowns)))
     H = _from_template(pixels, end.state.W) @ template.H
+    even = _in_even_light(pixels, end.state)
     counts = np.maximum(np.bincount(pixels.cell, minlength=9), 1)
     estimate = (inverse[:8].astype(np.float32) @ (WJ / np.sqrt(pixels.trust))).astype(np.float32)
     slope2 = end.J[2] ** 2 + end.J[5] ** 2  # by a shift along x, along y
@@ -189,18 +197,29 @@ def fit_template(template: Template, pixels: Pixels) -> Fit | None:
         further=end.state.further,
         weight=float(end.weight.mean()),
         cells=(np.bincount(pixels.cell, end.weight, minlength=9) / counts).reshape(3, 3),
-        ncc=_correlation(end.T[clear], pixels.level[clear]),
-        whole_ncc=_correlation(end.T, pixels.level),
+        ncc=_correlation(end.T[clear], even[clear]),
+        whole_ncc=_correlation(end.T, even),
         converged=end.converged,
     )
 
 
+def weights_in_place(template: Template, pixels: Pixels) -> Singles:
+    """Robust weights (N,) where the template lies: its light alone is fitted, nothing moves."""
+    T = _read(template, pixels, np.eye(3))[0]
+    weight: Singles = np.ones_like(T)
+    for _ in range(LIGHT_ROUNDS):
+        light = _light(pixels, T, weight * pixels.trust)
+        weight = _tukey(pixels.level - _image(pixels, light, T), max(float(light[3]), LEAST_GAIN))
+    return weight
+
+
 def _settle(template: Template, pixels: Pixels) -> _Settled | None:
     """Gauss-Newton with Tukey weights from the second pass on."""
-    state = _State(np.eye(3), np.zeros(6), np.zeros(template.texture.shape[2] - 3))
+    spread = _covariance_px2(template.blur) / pixels.scale
+    state = _State(np.eye(3), np.zeros(6), np.zeros(template.texture.shape[2] - 3), spread)
     reads = _read(template, pixels, state.W)
     weight = np.ones_like(pixels.X)
-    state.light = _light(pixels, reads[0])
+    state.light = _light(pixels, reads[0], weight)
     converged = False
     for step in range(PASSES):
         J, residual = _linearised(pixels, reads, state)
@@ -220,9 +239,12 @@ def _settle(template: Template, pixels: Pixels) -> _Settled | None:
         if step and np.abs(change[:8]).max() * pixels.scale < MOVED_PX:
             converged = True
             break
-    T = _level(reads, state)
-    residual = pixels.level - _image(pixels, state, T)
-    return _Settled(state, J, T, residual, weight, converged)
+    J, residual = _linearised(pixels, reads, state)
+    return _Settled(state, J, _level(reads, state), residual, weight, converged)
+
+
+def _covariance_px2(blur: Blur) -> Floats:
+    return blur.variance_px2 * np.eye(2) + np.outer(blur.motion_px, blur.motion_px) / 12
 
 
 def _read(template: Template, pixels: Pixels, W: Floats) -> Singles:
@@ -247,11 +269,12 @@ def _read(template: Template, pixels: Pixels, W: Floats) -> Singles:
     return np.ascontiguousarray(np.concatenate(parts, axis=1)[0].T, dtype=np.float32)
 
 
-def _light(pixels: Pixels, T: Singles) -> Floats:
+def _light(pixels: Pixels, T: Singles, weight: Singles) -> Floats:
     """Planes of dark level and contrast (6,) by linear least squares."""
     J = np.stack([np.ones_like(T), pixels.X, pixels.Y, T, pixels.X * T, pixels.Y * T])
-    A = (J @ J.T).astype(np.float64) + 1e-3 * np.eye(6)
-    return np.asarray(np.linalg.solve(A, (J @ pixels.level).astype(np.float64)))
+    WJ = J * weight
+    A = (WJ @ J.T).astype(np.float64) + 1e-3 * np.eye(6)
+    return np.asarray(np.linalg.solve(A, (WJ @ pixels.level).astype(np.float64)))
 
 
 def _level(reads: Singles, state: _State) -> Singles:
@@ -260,11 +283,30 @@ def _level(reads: Singles, state: _State) -> Singles:
     return out
 
 
-def _image(pixels: Pixels, state: _State, T: Singles) -> Singles:
+def _image(pixels: Pixels, light: Floats, T: Singles) -> Singles:
     """Grey levels (N,) that template level T has in the present light."""
     X, Y = pixels.X, pixels.Y
-    o, ox, oy, g, gx, gy = state.light.astype(np.float32)
+    o, ox, oy, g, gx, gy = light.astype(np.float32)
     out: Singles = o + ox * X + oy * Y + (g + gx * X + gy * Y) * T
+    return out
+
+
+def _blurred_light(reads: Singles, state: _State) -> Singles:
+    """What blurring the light too adds (N,): the blur's covariance times both slopes.
+
+    Without it a gradient of 4:1 over 48 px moves the marker by 0.01 px.
+    """
+    x, y = (state.spread @ state.light[4:6]).astype(np.float32)
+    out: Singles = x * reads[1] + y * reads[2]
+    return out
+
+
+def _in_even_light(pixels: Pixels, state: _State) -> Singles:
+    """The pixels (N,) as template levels: the planes of dark and contrast taken out."""
+    X, Y = pixels.X, pixels.Y
+    o, ox, oy, g, gx, gy = state.light.astype(np.float32)
+    gain = np.maximum(g + gx * X + gy * Y, np.float32(LEAST_SHARE) * g)
+    out: Singles = (pixels.level - (o + ox * X + oy * Y)) / gain
     return out
 
 
@@ -274,7 +316,7 @@ def _linearised(pixels: Pixels, reads: Singles, state: _State) -> tuple[Singles,
     _, _, _, g, gx, gy = state.light.astype(np.float32)
     gain = g + gx * X + gy * Y
     T = _level(reads, state)
-    residual = pixels.level - _image(pixels, state, T)
+    residual = pixels.level - _image(pixels, state.light, T) - _blurred_light(reads, state)
     M = state.W.astype(np.float32)
     w = 1 / (M[2, 0] * X + M[2, 1] * Y + M[2, 2])
     bend = gain * w * np.float32(pixels.scale)
@@ -283,7 +325,9 @@ def _linearised(pixels: Pixels, reads: Singles, state: _State) -> tuple[Singles,
     back *= -w
     one = np.ones_like(X)
     homography = [p * X, p * Y, p, q * X, q * Y, q, back * X, back * Y]
-    J = np.stack([*homography, one, X, Y, T, X * T, Y * T, *(gain * reads[3:])])
+    (a, b), (c, d) = state.spread.astype(np.float32)
+    XT, YT = X * T + (a * reads[1] + c * reads[2]), Y * T + (b * reads[1] + d * reads[2])
+    J = np.stack([*homography, one, X, Y, T, XT, YT, *(gain * reads[3:])])
     return J, residual
 
 

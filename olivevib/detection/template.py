@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Bools, Floats
+from olivevib.detection.bend import Bend, bent_maps
 from olivevib.geometry import apply_homography
 
 FINE, COARSE = 4, 2  # texture samples a pixel: to measure with, to approach with
@@ -22,6 +23,7 @@ LEAST_BLUR = 0.3  # texture samples; sharper cannot be drawn
 REACH = 0.6  # modules around the dark square that are drawn
 MARGIN_PX = 4.0  # and px around these; beyond them the edge is repeated
 LARGE_PX = 20.0  # side of a module from which the coarse drawing is fine enough
+SMALL_PX = 3.2  # side of a module below which FINE would leave a bias of 0.001 px
 FINENESS = (4, 8, 16, 32)  # drawn samples a module
 LEAST_PATH_PX = 0.5  # a shorter motion is part of the round blur
 PATH_POINTS = 512  # of a motion path
@@ -76,12 +78,18 @@ def draw_template(
     quiet: int = 2,
     samples: int = FINE,
     moments: bool = False,
+    bend: Bend | None = None,
 ) -> Template:
     """Draw a card (n, n) with its ``quiet`` zone at pose H; ``moments`` asks for S = 3.
 
+    With a ``bend`` it lies on a cylinder, and H is the pose of the plane that touches its middle.
+
     Degenerates for a variance below 0.1 px²: the texture's own sampling is then the blur.
     """
-    samples = samples if module_px(H) < LARGE_PX else COARSE
+    if module_px(H) >= LARGE_PX:
+        samples = COARSE
+    elif module_px(H) < SMALL_PX and samples == FINE:
+        samples = 2 * FINE
     half = len(white) / 2
     reach = half - quiet + REACH
     box = apply_homography(H, [[-reach, -reach], [reach, -reach], [reach, reach], [-reach, reach]])
@@ -90,15 +98,20 @@ def draw_template(
     side_px = module_px(H)
     fine = min(FINENESS, key=lambda m: abs(np.log(m / (0.7 * samples * side_px))))
     drawn = white.repeat(fine, axis=0).repeat(fine, axis=1)
-    to_image = np.array([[1 / samples, 0, origin[0]], [0, 1 / samples, origin[1]], [0, 0, 1]])
-    to_drawn = np.array([[fine, 0, fine * half - 0.5], [0, fine, fine * half - 0.5], [0, 0, 1]])
-    sharp = cv2.warpPerspective(
-        drawn,
-        to_drawn @ np.linalg.inv(H) @ to_image,
-        (int(width), int(height)),
-        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
+    size, first = (int(width), int(height)), fine * half - 0.5
+    if bend is None:
+        to_image = np.array([[1 / samples, 0, origin[0]], [0, 1 / samples, origin[1]], [0, 0, 1]])
+        to_drawn = np.array([[fine, 0, first], [0, fine, first], [0, 0, 1]])
+        sharp = cv2.warpPerspective(
+            drawn,
+            to_drawn @ np.linalg.inv(H) @ to_image,
+            size,
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+    else:
+        u, v = (fine * part + first for part in bent_maps(bend, H, origin, size, samples))
+        sharp = cv2.remap(drawn, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     own = 1 / (6 * samples**2) + (side_px / fine) ** 2 / 12  # bilinear reads, drawn ramps
     sigma = samples * float(np.sqrt(max(blur.variance_px2 - own, 0.0)))
     level = _smeared(np.asarray(sharp, dtype=np.float32), sigma, blur, samples)

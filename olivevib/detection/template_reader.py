@@ -6,19 +6,23 @@ image allows; what is covered, shadowed or doubtful is flagged rather than quiet
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from olivevib.arrays import Bools, Floats, Grey, Ints
+from olivevib.detection.bend import Wrapped
 from olivevib.detection.candidates import dark_passes, fine_bars
-from olivevib.detection.card_fit import CardFit, fit_card
+from olivevib.detection.card_fit import EVEN, CardFit, fit_card
+from olivevib.detection.covers import without_cover
 from olivevib.detection.detection import Detection
 from olivevib.detection.hypotheses import Frames, frame_hypotheses, joined
 from olivevib.detection.refine import Fit, fitted_points
 from olivevib.detection.settings import DetectionSettings
 from olivevib.detection.softcode import SoftMatch, SoftReader
 from olivevib.detection.template import Blur, card
+from olivevib.detection.wrapped import fit_wrapped
 from olivevib.geometry import apply_homography
 from olivevib.marker import MarkerLibrary
 
@@ -31,6 +35,7 @@ RMS = (0.16, 0.2)  # of the gain
 COVERED = 0.9  # mean weight below which a part is covered
 CELL = 0.7  # weight of a ninth of the marker below which it is called occluded
 SMALLEST_PX2 = 60.0
+BENT_SIGMA_PX = (0.015, 0.05)  # left on rendered cylinders: radius known, radius estimated
 NEAR_SIZES = 0.25  # of a marker: no second one is looked for so close to one that was found
 FAR_CODES = 12 / 49  # distance of codes from which the whole drawing tells them apart
 
@@ -53,9 +58,15 @@ class TemplateReader:
     threads.
     """
 
-    def __init__(self, library: MarkerLibrary, settings: DetectionSettings | None = None) -> None:
+    def __init__(
+        self,
+        library: MarkerLibrary,
+        settings: DetectionSettings | None = None,
+        wrapped: Sequence[Wrapped] = (),
+    ) -> None:
         self.library = library
         self.settings = settings or DetectionSettings()
+        self._wrapped = {one.id: one for one in wrapped}
         self._soft = SoftReader(library)
         mirrored = replace(library, codes=library.codes[:, :, ::-1])
         self._mirrored = SoftReader(mirrored)
@@ -71,7 +82,7 @@ class TemplateReader:
 
         Flags: "occluded" (a ninth of the marker is covered by 30 % or more), "shadowed" (the light
         on it had to be evened out), "duplicate" (the id was seen at several places; the largest is
-        reported).
+        reported), "misfit" (it is bent otherwise than a cylinder that touches it in its middle).
         """
         found: dict[int, Detection] = {}
         for one in self._fitted(grey, self._hypotheses(grey)):
@@ -129,6 +140,9 @@ class TemplateReader:
         """
         row, turn, first_wrong = code
         start = _turned(H, turn)
+        wrapped = self._wrapped.get(int(self.library.ids[row]))
+        if wrapped is not None:
+            return self._fit_bent(grey, start, (row, first_wrong), wrapped)
         card_fit = fit_card(grey, self.cards[row], start, self.library.layout, blur or Blur())
         if card_fit is None:
             return None
@@ -141,7 +155,20 @@ class TemplateReader:
         clear = read and wrong <= self._wrong[fit.weight < COVERED]
         if not clear and not (self.far and fit.whole_ncc >= SURE):
             return None
-        return Found(row, fit.H, card_fit, wrong if read else first_wrong)
+        card_fit = without_cover(grey, self.cards[row], card_fit, self.library.layout)
+        return Found(row, card_fit.fit.H, card_fit, wrong if read else first_wrong)
+
+    def _fit_bent(
+        self, grey: Grey, H: Floats, code: tuple[int, int], wrapped: Wrapped
+    ) -> Found | None:
+        """Fit a marker that is wrapped round a branch; the whole drawing must agree."""
+        layout = self.library.layout
+        bent = fit_wrapped(grey, self.cards[code[0]], H, layout, wrapped)
+        if bent is None or not sound(bent.fit, H, layout.cornerstones):
+            return None
+        if not (self.far and bent.fit.whole_ncc >= SURE):
+            return None
+        return Found(code[0], bent.fit.H, bent, code[1])
 
     def detection(self, one: Found) -> Detection:
         """What is said of a fitted marker."""
@@ -153,9 +180,14 @@ def fitted_detection(library: MarkerLibrary, one: Found) -> Detection:
     fit = one.card.fit
     points = np.vstack([np.zeros((1, 2)), library.layout.cornerstones])
     px, covariance = fitted_points(fit, points)
+    if one.card.bend is not None:
+        sigma = BENT_SIGMA_PX[one.card.bend.estimated]
+        covariance = covariance + sigma**2 * np.eye(len(covariance))
     flags = ["occluded"] if fit.cells.min() < CELL else []
     if one.card.uneven:
         flags.append("shadowed")
+    if one.card.bend is not None and fit.rms > EVEN * fit.gain:
+        flags.append("misfit")
     return Detection(
         id=int(library.ids[one.row]),
         corners_px=px[1:],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from olivevib.arrays import Floats
+from olivevib.detection import Wrapped
 from olivevib.errors import UsageError
 from olivevib.marker import MarkerLibrary, load_library
 from olivevib.trial import Trial, TrialSettings
@@ -17,6 +18,19 @@ def trial_library(trial: Trial) -> MarkerLibrary:
     file = library_file(trial.folder, markers.library)
     library = load_library(str(file) if file else markers.library)
     return only_known(library, markers.ids)
+
+
+def wrapped_markers(trial: Trial) -> tuple[Wrapped, ...]:
+    """The markers that trial.toml says are wrapped round a branch, radius in their own modules."""
+    markers = trial.settings.markers
+    modules = trial_library(trial).layout.modules
+    out = []
+    for one in markers.marker:
+        size, diameter = markers.size_of(one.id), one.branch_diameter_mm
+        radius = modules * diameter / (2 * size) if size and diameter else None
+        if one.wrapped:
+            out.append(Wrapped(one.id, radius, one.axis_deg))
+    return tuple(out)
 
 
 def only_known(library: MarkerLibrary, ids: tuple[int, ...]) -> MarkerLibrary:

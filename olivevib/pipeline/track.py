@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from olivevib.detection import DetectionSettings, Detector
+from olivevib.detection import Detector
 from olivevib.errors import Caution
 from olivevib.files.journal import Journal
 from olivevib.files.store import write_stage
 from olivevib.files.video import Frame, Video, VideoInfo
 from olivevib.marker import MarkerLibrary
-from olivevib.pipeline.libraries import trial_library
+from olivevib.pipeline.libraries import trial_library, wrapped_markers
 from olivevib.pipeline.observations import FrameObservations, pack, unpack
 from olivevib.pipeline.recordings import SIDES, check_sizes
 from olivevib.pipeline.tracks_result import stored_tracks
@@ -105,7 +105,7 @@ def _measure(
         start, memory = (0, None) if last is None else (last[0] + 1, last[1])
         done += start
         path = trial.path(getattr(trial.settings.cameras, side).video)
-        tracker = _tracker(library, trial.settings.detection, memory)
+        tracker = _tracker(trial, library, memory)
         makers[side] = partial(_steps, path, start, tracker, partial(notes.__setitem__, side))
 
     def collect(side: str, step: _Step) -> None:
@@ -125,8 +125,8 @@ def _measure(
     return tuple(note for side in SIDES for note in notes[side])
 
 
-def _tracker(library: MarkerLibrary, settings: DetectionSettings, memory: bytes | None) -> Tracker:
-    tracker = Tracker(library, settings)
+def _tracker(trial: Trial, library: MarkerLibrary, memory: bytes | None) -> Tracker:
+    tracker = Tracker(library, trial.settings.detection, wrapped_markers(trial))
     if memory is not None:
         tracker.recall(memory)
     return tracker

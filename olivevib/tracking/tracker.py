@@ -6,9 +6,10 @@ Source: paper, section 3.3 (location rectangles, re-initialisation).
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 
 from olivevib.arrays import Floats, Grey
-from olivevib.detection import Detection, DetectionSettings, Detector
+from olivevib.detection import Detection, DetectionSettings, Detector, Wrapped
 from olivevib.marker import MarkerLibrary
 from olivevib.tracking.memory import as_bytes, hexed, pack_known, unhexed, unpack_known
 from olivevib.tracking.rectangles import read_rectangles
@@ -27,9 +28,14 @@ class Tracker:
     frames alone and on ``memory()``, which ``recall`` restores.
     """
 
-    def __init__(self, library: MarkerLibrary, settings: DetectionSettings | None = None) -> None:
+    def __init__(
+        self,
+        library: MarkerLibrary,
+        settings: DetectionSettings | None = None,
+        wrapped: Sequence[Wrapped] = (),
+    ) -> None:
         self.settings = settings or DetectionSettings()
-        self._detector = Detector(library, self.settings)
+        self._detector = Detector(library, self.settings, wrapped)
         self._follower = self._detector.follower()
         self._ids = len(library.ids)
         self._last: dict[int, Floats] = {}

@@ -103,10 +103,12 @@ def _settings(settings: TrialSettings, stage: Stage) -> dict[str, Any]:
     markers = whole["markers"]
     sizes = {m["id"]: m["size_mm"] for m in markers["marker"] if m["size_mm"]}
     fixed = settings.markers.at("fixed")
+    wrapped = [m for m in markers["marker"] if m["wrapped"]]
     table = {
         "calibrate": cameras | _keyed("calibration", whole["calibration"], _FILE_KEYS),
         "track": cameras
         | {"markers.library": markers["library"], "markers.ids": markers["ids"]}
+        | {"wrapped markers": wrapped or None}
         | _keyed("detection", whole["detection"], ()),
         "reconstruct": {"markers.size_mm": markers["size_mm"], "markers.marker.size_mm": sizes}
         | _keyed("reconstruction", whole["reconstruction"], ()),

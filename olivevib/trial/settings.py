@@ -63,6 +63,8 @@ class MarkerPlace(Section):
     angle_deg: float | None = None
     distance_mm: float | None = Positive
     size_mm: float | None = Positive
+    wrapped: bool = False  # round the branch, like a cuff; else it is flat
+    axis_deg: float = 90.0  # of the branch in the print, from right to down: 90 is upright
 
 
 class Markers(Section):
