@@ -36,8 +36,17 @@ class Canvas:
     def __post_init__(self) -> None:
         self.light = np.full((self.height, self.width), float(self.look.ground))
 
-    def add(self, pattern: np.ndarray, H: np.ndarray, quiet: float = 2.0) -> None:
-        """Draw a dark pattern (n, n) with its white card through H (centred modules to px)."""
+    def add(
+        self,
+        pattern: np.ndarray,
+        H: np.ndarray,
+        quiet: float = 2.0,
+        slope: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
+        """Draw a dark pattern (n, n) with its white card through H (centred modules to px).
+
+        slope: change of the light per px along x and y, 1 at the marker's centre.
+        """
         s, n = self.look.samples, len(pattern)
         half = n / 2 + quiet
         card = apply_homography(H, [[-half, -half], [half, -half], [half, half], [-half, half]])
@@ -59,6 +68,8 @@ class Canvas:
         black[inside] = pattern[j[inside], i[inside]]
         shape = (y1 - y0, s, x1 - x0, s)
         level = np.where(black, self.look.dark, self.look.white) * on
+        ex, ey = apply_homography(H, [[0, 0]])[0]
+        level = level * (1 + slope[0] * (xs - ex)[None] + slope[1] * (ys - ey)[:, None])
         cover, level = (self._spread(fine).reshape(shape).mean((1, 3)) for fine in (on, level))
         a, b = max(y0, 0), min(y1, self.height)
         c, d = max(x0, 0), min(x1, self.width)

@@ -221,3 +221,32 @@ def test_false_matches_are_as_rare_as_stated():
 
 def test_blur_reaches_half_its_path_and_two_sigma():
     assert Blur(1.0, (3.0, 4.0)).half_width_px == pytest.approx(4.5)
+
+
+def test_a_gradient_of_light_is_blurred_with_the_marker():
+    """Light falls on the marker before the lens smears it: 3:1 across it moves no centre."""
+    errors, squares = [], []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        canvas = Canvas(200, 200, Look(25, 130, psf_px=1.0, samples=12), rng=rng)
+        H = pose(11, 48, 20, rng.uniform(0, 360), rng.uniform(0, 360), (639.8, 359.1))
+        H = np.array([[1, 0, -540.0], [0, 1, -260], [0, 0, 1]]) @ H
+        canvas.add(LIBRARY.layout.pattern(LIBRARY.codes[seed]), H / H[2, 2], slope=(0.02, 0.0))
+        (d,) = TemplateReader(LIBRARY).detect(canvas.grey())
+        e = d.centre_px - apply_homography(H, [[0, 0]])[0]
+        errors.append(e)
+        squares.append(e @ np.linalg.solve(d.centre_cov_px2, e))
+        assert d.flags == ()
+    assert rms(np.array(errors)) < 0.006
+    assert np.mean(squares) < 5
+
+
+def test_a_strip_that_hides_most_of_a_bar_moves_no_centre():
+    canvas, truth = scene(8)
+    for H in truth.values():
+        cover(canvas, H, 0.10, 30.0, corner=False)
+    errors, flagged, normalised = measured(canvas.grey(), truth)
+    assert len(errors) >= 23
+    assert rms(errors) < 0.006
+    assert flagged.all()
+    assert (normalised < 5.99).mean() > 0.7

@@ -292,10 +292,7 @@ def _image(pixels: Pixels, light: Floats, T: Singles) -> Singles:
 
 
 def _blurred_light(reads: Singles, state: _State) -> Singles:
-    """What blurring the light too adds (N,): the blur's covariance times both slopes.
-
-    Without it a gradient of 4:1 over 48 px moves the marker by 0.01 px.
-    """
+    """What blurring the light too adds (N,); else 4:1 over 48 px moves a marker by 0.01 px."""
     x, y = (state.spread @ state.light[4:6]).astype(np.float32)
     out: Singles = x * reads[1] + y * reads[2]
     return out
