@@ -22,6 +22,13 @@ PAGES = {
 }
 
 
+def load_pages() -> None:
+    """Import every page, in whatever thread this is called in."""
+    modules = {place.split(":")[0] for place in PAGES.values()}
+    for module in sorted({*modules, "new_trial", "capture", "live"}):
+        import_module(f"olivevib.tui.screens.{module}")
+
+
 def make_page(name: str, folder: Path) -> Page:
     """The page ``name`` of the trial in ``folder``."""
     module, kind = PAGES[name].split(":")

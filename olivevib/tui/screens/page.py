@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, cast
 
-from textual import work
+from textual import events, work
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.message import Message
@@ -71,6 +71,7 @@ class Page(Screen[None]):
     def __init__(self, folder: Path) -> None:
         super().__init__()
         self.folder = folder
+        self._early: list[events.Key] | None = []  # typed while the page opens; None: it is open
 
     @property
     def olive(self) -> OlivevibApp:
@@ -93,8 +94,21 @@ class Page(Screen[None]):
 
         Textual calls the handlers of base classes by itself: subclasses do not call this one.
         """
+        self.call_after_refresh(self._opened)
         self.watch(self.app, "revision", self.reload)
         self.watch(self.app, "theme", self.recolour, init=False)
+
+    def on_key(self, event: events.Key) -> None:
+        """Keep what is typed before the page has a focus: a fast hand loses no key."""
+        if self._early is not None and self.focused is None:
+            event.stop()
+            event.prevent_default()
+            self._early.append(event)
+
+    def _opened(self) -> None:
+        early, self._early = self._early or [], None
+        for event in early:
+            self.app.post_message(events.Key(event.key, event.character))
 
     def reload(self) -> None:
         """Read again, in a thread; what comes is handed to ``show``."""

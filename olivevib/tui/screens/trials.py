@@ -17,6 +17,7 @@ from textual.worker import get_current_worker
 
 from olivevib.tui import jobs
 from olivevib.tui.loader import STAGE_NAMES, TrialRow, trial_folders, trial_row
+from olivevib.tui.screens import load_pages
 from olivevib.tui.screens.edit import EditScreen
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.views.trial_list import columns_of, empty_text, matching, trial_cells, why_text
@@ -99,6 +100,7 @@ class TrialsPage(Page):
             if worker.is_cancelled:
                 return
             self.post_message(self.RowRead(row))
+        load_pages()  # so that the next key need not wait for what its page needs
 
     def show(self, value: object) -> None:
         """The names are known; the states follow."""
