@@ -95,7 +95,7 @@ def _row(case: Case, each: list[_Result]) -> tuple[str | int | float, ...]:
     pulls = errors / np.array([r.sigma for r in each])
     agreed = sum(r.found.verdict.value == "agrees" for r in each)
     scale = np.array([1e6, 1.0, 100.0])
-    sizes = [rms(errors[:, k]) * scale[k] for k in range(3)]
+    sizes = [float(rms(errors[:, k]) * scale[k]) for k in range(3)]
     turned = rms([r.turn_deg for r in each])
     return (case.name, len(each), *sizes, turned, *(rms(pulls[:, k]) for k in range(3)), agreed)
 
