@@ -201,10 +201,9 @@ def finished(
     model, best = fitted
     chi2 = chi2_of(model, best)
     table = table_of(ready, weighed, chi2)
+    scale = max(1.0, chi2) * ready.pixels.learned
     plain = (False,) * ready.settings.harmonics
-    markers, timing = markers_of(
-        model, best, ready.observations, ready.poses, plain, max(1.0, chi2)
-    )
+    markers, timing = markers_of(model, best, ready.observations, ready.poses, plain, scale)
     strongest = max(markers, key=lambda m: float(np.abs(m.cosine[0] + 1j * m.sine[0])[:3].max()))
     amplitude = np.abs(strongest.cosine[0] + 1j * strongest.sine[0])[:3]
     facts = Facts(

@@ -18,6 +18,7 @@ from olivevib.reconstruction.motion.types import Observations, Sightings
 SPACINGS_S = (0.4, 0.3, 0.2, 0.15, 0.1)  # of knots, longest first
 RISE = 1.05  # of the noise variance that a longer spacing may cost
 SLOW_HZ = 2.7  # a line that appears slower is left to the spline when its spacing is chosen
+OWN_FRAMES = 12.0  # frames that the localiser's own covariance counts for
 LEAST_FREE = 24  # degrees of freedom below which no noise is measured
 
 
@@ -33,6 +34,19 @@ class Pixels:
     peaks_hz: tuple[float, ...]
     noise: tuple[tuple[Floats, float], ...]
     scale: float
+
+    @property
+    def learned(self) -> float:
+        """What variances grow by because the noise was measured from finitely many frames.
+
+        (n / (n - p))^2 for n degrees of freedom and p pixels a frame: once because the inverse of
+        a measured covariance is too large, once because it weighs amiss.
+        """
+        factors = [
+            ((free + OWN_FRAMES) / (free + OWN_FRAMES - len(c))) ** 2 if free else 1.0
+            for c, free in self.noise
+        ]
+        return float(np.mean(factors))
 
 
 def views_of(observations: Observations) -> list[Sightings]:
@@ -153,7 +167,7 @@ def _noise(
         return own, 0.0
     seen = r.T @ r / free
     scale = float(np.trace(np.linalg.solve(own, seen)) / own.shape[0])
-    share = 12.0 / (12.0 + free)
+    share = OWN_FRAMES / (OWN_FRAMES + free)
     return share * scale * own + (1 - share) * seen, free
 
 
