@@ -145,6 +145,7 @@ def test_a_fine_grid_inside_frames_outside_gaps_stay_gaps(frames):
     here = inside & seen[:, 0]
     np.testing.assert_allclose(path.xyz_mm[here, 0], np.array([30, 0, 1400]) + wave(path.t_s[here]))
     assert seen[:, 2].sum() == 121  # its own samples, all of them, no more
+    assert set(path.state[~inside & seen[:, 1], 1]) == {int(State.FLAGGED)}
     own = path.sample_t_s[seen[:, 2], 2]
     assert np.isin(np.round(own, 9), np.round(frames.sample_t_s[:, 2], 9)).all()
     assert path.method == "continuous" and {f.id for f in path.fits} == {3, 7}

@@ -14,6 +14,7 @@ from olivevib.arrays import Floats
 from olivevib.errors import InputError
 from olivevib.geometry import nearest_rotation
 from olivevib.reconstruction import Trajectory
+from olivevib.signals import State
 from olivevib.trial import Trial
 from olivevib.vibration import MarkerMotion
 
@@ -72,7 +73,10 @@ def compare_with_truth(trial: Trial, truth: Path) -> TruthReport:
         raise trial.need("reconstruct")
     facts = _facts(truth)
     true_xyz = _true_positions(truth, trajectory)
-    errors, R, shift = _align(trajectory.xyz_mm, true_xyz)
+    measured = trajectory.xyz_mm
+    if trajectory.method == "continuous":  # frames outside of the fit are flagged, not measured
+        measured = np.where((trajectory.state == State.FLAGGED)[..., None], np.nan, measured)
+    errors, R, shift = _align(measured, true_xyz)
     sigma = np.sqrt(np.einsum("ij,nmjk,ik->nmi", R, trajectory.covariance_mm2, R))
     rows = [
         _marker(trial, trajectory, m, errors[:, m], sigma[:, m], facts)

@@ -48,6 +48,7 @@ def trajectory_of(fit: MotionFit, frames: Trajectory) -> Trajectory:
     frames: what was triangulated, on the frames' times. Inside the fit every row is a grid point;
     a marker has a position there only while the nearest frame showed it, so gaps stay gaps. A
     marker that was not fitted keeps its own samples, each in the row nearest to its instant.
+    Outside, frames are flagged: while a machine starts or stops, no interpolation follows it.
     """
     rate = 1.0 / float(np.median(np.diff(frames.t_s)))
     grid = fine_grid(fit, rate)
@@ -86,7 +87,9 @@ class _Rows:
             [frames.sample_t_s[outside], np.repeat(grid[:, None], m, axis=1)]
         )
         empty = np.full((grid.size, m), int(State.DROPPED), np.int64)
-        self.state = np.vstack([frames.state[outside], empty])
+        before = frames.state[outside]
+        doubtful = np.where(before == State.SEEN, int(State.FLAGGED), before)
+        self.state = np.vstack([doubtful, empty])
 
     def _start(self, kept: Floats) -> Floats:
         rest = np.full((self.grid.size, *kept.shape[1:]), np.nan)
