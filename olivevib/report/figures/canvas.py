@@ -30,6 +30,7 @@ from olivevib.arrays import Bools, Floats
 from olivevib.report.clean import clean
 
 WIDTH_IN = 8.6  # every figure has the width of the page
+TICK_LEFT, TICK_DOWN = 0, 3  # matplotlib's markers
 INK, QUIET, GRID, SHADE = "#1c2127", "#5b6570", "#d4dae1", "#eaeef3"
 AXIS_COLOURS = ("#0072b1", "#d45e01", "#009e72")  # x, y, z: told apart by colour-blind readers
 AXIS_STYLES: tuple[Any, ...] = ("-", (0, (4, 1.4)), (0, (1.2, 1.2)))
@@ -216,11 +217,46 @@ def key(
         x_in += 0.6 + 0.056 * len(word)
 
 
-def label_ticks(ax: Axes, *, left: bool, bottom: bool) -> None:
-    """Numbers only on the outer panels of a grid; inner ones carry no ticks at the bottom."""
-    ax.tick_params(labelleft=left, left=left)
-    if not bottom:
-        ax.xaxis.set_major_locator(NullLocator())
+def light_ticks(
+    ax: Axes, x: Sequence[float], y: Sequence[float], *, left: bool, bottom: bool
+) -> None:
+    """Ticks, their numbers and the grid of a panel as three artists; its limits must stand.
+
+    matplotlib builds five artists a tick, which is most of the time that a grid of panels takes.
+    Numbers stand only at the left and at the bottom where asked for.
+    """
+    at_x = np.array([v for v in x if min(ax.get_xlim()) <= v <= max(ax.get_xlim())])
+    at_y = np.array([v for v in y if min(ax.get_ylim()) <= v <= max(ax.get_ylim())])
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(NullLocator())
+        axis.set_minor_locator(NullLocator())
+    across, up = ax.get_yaxis_transform(), ax.get_xaxis_transform()
+    ax.hlines(at_y, 0, 1, transform=across, color=GRID, lw=0.5, zorder=0.5)
+    how: dict[str, Any] = {"ls": "", "color": QUIET, "ms": 2.5, "mew": 0.6, "clip_on": False}
+    words: dict[str, Any] = {"fontsize": 7, "color": QUIET, "annotation_clip": False,
+                             "textcoords": "offset points"}  # fmt: skip
+    if left:
+        ax.yaxis.labelpad = 18
+        ax.plot(np.zeros(at_y.size), at_y, marker=TICK_LEFT, transform=across, **how)
+        for value, word in zip(at_y, _numbers(at_y), strict=True):
+            ax.annotate(word, (0, value), (-4.5, 0), xycoords=across, ha="right",
+                        va="center_baseline", **words)  # fmt: skip
+    if bottom:
+        ax.plot(at_x, np.zeros(at_x.size), marker=TICK_DOWN, transform=up, **how)
+        for value, word in zip(at_x, _numbers(at_x), strict=True):
+            ax.annotate(word, (value, 0), (0, -4.5), xycoords=up, ha="center", va="top", **words)
+        ax.xaxis.labelpad = 12
+
+
+def _numbers(values: Floats) -> list[str]:
+    """Tick values as short numbers of equal decimals, where they are evenly spaced."""
+    steps = np.diff(values)
+    if values.size > 1 and np.allclose(steps, steps[0]):
+        decimals = next((d for d in range(6) if np.allclose(values, np.round(values, d))), 6)
+        return [
+            f"{v:.{decimals}f}".replace("-", "\u2212") for v in np.round(values, decimals) + 0.0
+        ]
+    return [f"{v:g}".replace("-", "\u2212") for v in values]
 
 
 def dots(ax: Axes, x: Floats, y: Floats, size_pt: float, colour: str) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from olivevib.arrays import Floats, Ints
 from olivevib.reconstruction.trajectory import Trajectory
@@ -138,9 +139,8 @@ def _fitted(row: Sequence[Axes], line: Line, data: tuple[Floats, Floats], window
 def _frame(grid: Sequence[Sequence[Axes]]) -> None:
     for r, row in enumerate(grid):
         for k, ax in enumerate(row):
-            ax.grid(axis="y")
-            ax.locator_params(axis="y", nbins=4)
-            ax.locator_params(axis="x", nbins=6, prune="upper")
-            canvas.label_ticks(ax, left=k == 0, bottom=r == len(grid) - 1)
+            x = MaxNLocator(6, prune="upper").tick_values(*ax.get_xlim())
+            y = MaxNLocator(4).tick_values(*ax.get_ylim())
+            canvas.light_ticks(ax, x, y, left=k == 0, bottom=r == len(grid) - 1)
     for ax in grid[-1]:
         ax.set_xlabel("trial clock, s")

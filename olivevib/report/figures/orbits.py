@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
+from matplotlib.ticker import MaxNLocator
 
 from olivevib.arrays import Floats
 from olivevib.reconstruction.trajectory import Trajectory
@@ -52,9 +52,8 @@ def orbits(
                 down = -1 if plane[1] == "y" and trajectory.frame == "left camera" else 1
                 grid[r][c].set_xlim(-reach_mm, reach_mm)
                 grid[r][c].set_ylim(-reach_mm * down, reach_mm * down)
-                canvas.label_ticks(grid[r][c], left=c == 0, bottom=r == 2)
-                if c > 0:
-                    grid[r][c].yaxis.set_major_locator(NullLocator())
+                ticks = MaxNLocator(4).tick_values(-reach_mm, reach_mm)
+                canvas.light_ticks(grid[r][c], ticks, ticks, left=c == 0, bottom=r == 2)
             grid[0][c].set_title(_two_lines(names[marker_id]), fontsize=7, pad=3)
         for r, (_, up) in enumerate(PLANES):
             over = PLANES[r][0]
@@ -85,6 +84,5 @@ def _panel(ax: Axes, xyz: Floats, plane: tuple[str, str], line: Line | None) -> 
         ellipse = line.amplitude * np.cos(turn[:, None] + line.phase_rad)
         ax.plot(ellipse[:, i], ellipse[:, j], color=canvas.MARK, lw=1.2)
     ax.set_aspect("equal")
-    ax.locator_params(nbins=4)
     for side in ("top", "right"):
         ax.spines[side].set_visible(True)

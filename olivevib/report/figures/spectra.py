@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.ticker import LogLocator, MaxNLocator
 
 from olivevib.arrays import Floats
 from olivevib.report.figures import canvas
@@ -149,11 +149,8 @@ def _curve(
 
 def _scales(ax: Axes, limits: tuple[float, float], *, left: bool, bottom: bool) -> None:
     ax.set_ylim(limits)
-    ax.grid(axis="y")
-    ax.locator_params(axis="x", nbins=7, prune="upper")
-    canvas.label_ticks(ax, left=left, bottom=bottom)
-    ax.yaxis.set_major_locator(LogLocator(numticks=4))
-    ax.yaxis.set_major_formatter("{x:g}")
-    ax.yaxis.set_minor_locator(NullLocator())
+    x = MaxNLocator(7, prune="upper").tick_values(*ax.get_xlim())
+    y = LogLocator(numticks=4).tick_values(*limits)
+    canvas.light_ticks(ax, x, y, left=left, bottom=bottom)
     if bottom:
         ax.set_xlabel("frequency as sampled, Hz")
