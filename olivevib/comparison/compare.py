@@ -25,6 +25,7 @@ _FEWEST = 30
 _NARROWEST_HZ = 0.3
 _RESEMBLES = 0.8  # correlation below which the two motions are not called the same
 _CLOSE = 0.05  # a rival lag whose correlation comes that near is told
+_NOISE_ONLY = 0.95  # coherence below which what is left is more than noise: chi-square cannot tell
 _DECISIVE = 25.0  # chi-square by which the best lag must beat the rival to be sure
 _OPEN_DEG = 8.0  # sigma of the turn from which what is seen across may be noise
 _OPEN_RAD = 1.0  # sigma of a turn that nothing fixes
@@ -246,7 +247,7 @@ class _Rival:
         return self.near and not self.excluded
 
 
-def _rival(work: _Work, lag: CoarseLag, clock: ClockFit) -> _Rival:
+def _rival(work: _Work, lag: CoarseLag, clock: ClockFit, seen_mm: Floats) -> _Rival:
     if not np.isfinite(lag.rival_s) or lag.peak - lag.second_peak >= _CLOSE:
         return _Rival(False, True, 0.0, 0.0)
     _, other = work.refined(lag.rival_s)
@@ -257,6 +258,7 @@ def _rival(work: _Work, lag: CoarseLag, clock: ClockFit) -> _Rival:
         now, then = (np.mean((c.residual_mm / noise) ** 2) for c in (clock, other))
         frames = min(len(clock.residual_mm), len(other.residual_mm))
         excluded = bool(3 * frames * (then - now) > _DECISIVE)
+        excluded &= _coherence(seen_mm, clock.residual_mm) > _NOISE_ONLY
         distance = abs(other.offset_s - clock.offset_s)
     turn = _angle_deg(other.R_camera_sensor @ clock.R_camera_sensor.T)
     scatter = np.nan if lag.level else max(distance, lag.scatter_s)
@@ -277,7 +279,7 @@ def _comparison(
     clock: ClockFit,
     lines: tuple[LineDifference, ...],
 ) -> Comparison:
-    rival = _rival(work, lag, clock)
+    rival = _rival(work, lag, clock, seen.mm)
     sigma = clock.sigma
     offset_sigma = float(np.hypot(sigma[0], 0.0 if rival.excluded else rival.scatter_s))
     straight = _is_straight(seen.mm, clock)
