@@ -94,7 +94,7 @@ def _recorded(effort: Effort, tick: Tick) -> tuple[Table, list[Goal]]:
                 found = repeated(views, WEBCAM_SIZE, method, orders, rng)
                 sd, fails = scatter(found), failures(found, WEBCAM_SIZE[0])
                 off = np.abs(found[:, :, 0] / whole[0] - 1) > FALSE_MINIMUM
-                share = 100 * float(sd[:2].max()) / whole[0]
+                share = 100 * float(sd[:2].max() / whole[0])
                 rows.append((camera.name, method, *(round(float(v), 1) for v in sd), fails,
                              int(off.sum()), round(share, 2)))  # fmt: skip
                 if method != "ours":
