@@ -78,7 +78,8 @@ def failures(found: Floats, width: int) -> int:
 
 
 def _recorded(effort: Effort, tick: Tick) -> tuple[Table, list[Goal]]:
-    rows, goals = [], []
+    rows: list[tuple[Cell, ...]] = []
+    goals: list[Goal] = []
     orders = effort.count(ORDERS, 2)
     methods = list(lens_alone.METHODS)
     failed, astray, worst = 0, 0, ("", 0.0)
