@@ -19,7 +19,7 @@ from olivevib.files.exports import FORMATS, ExportFacts, export
 from olivevib.reconstruction.trajectory import Trajectory
 
 FACTS = ExportFacts("2026-11-20_T04 Täler 'a'", make_rig())
-ALWAYS = tuple(to for to in FORMATS if to != "c3d")
+ALWAYS = tuple(to for to in FORMATS if to not in ("c3d", "parquet"))
 
 
 def runs(trajectory: Trajectory, column: int) -> list[np.ndarray]:

@@ -79,7 +79,7 @@ def test_h5_opens_in_xarray_without_our_code(tmp_path: Path, engine: str) -> Non
     assert [p.name for p in path.parent.iterdir()] == ["a.h5"]
 
 
-@pytest.mark.parametrize("to", [to for to in FORMATS if to != "c3d"])
+@pytest.mark.parametrize("to", [to for to in FORMATS if to not in ("c3d", "parquet")])
 def test_same_bytes_twice_and_in_file_or_stream(tmp_path: Path, to: str) -> None:
     trajectory = make_trajectory()
     facts = ExportFacts("T04", make_rig(), (make_spectrum((7, 2, 31)),))
@@ -113,3 +113,16 @@ def test_formulas_are_quoted_and_numbers_are_not() -> None:
     assert spreadsheet_cell("-1.5e3") == "-1.5e3"
     assert spreadsheet_cell("-a,b") == '"\'-a,b"'
     assert fixed(np.array([-1e-12, np.nan, 1.0]), 3) == ["0.000", "", "1.000"]
+
+
+def test_parquet_is_read_by_pandas_with_the_numbers_of_csv(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    trajectory = make_trajectory()
+    export(trajectory, "parquet", tmp_path / "a.parquet")
+    assert (tmp_path / "a.parquet").read_bytes() == exported(trajectory, "parquet")
+    table = pd.read_parquet(tmp_path / "a.parquet")
+    text = pd.read_csv(io.BytesIO(exported(trajectory, "csv")))
+    assert table.columns.tolist() == text.columns.tolist()
+    for name in text.columns.drop("state"):
+        np.testing.assert_allclose(table[name], text[name], rtol=0, atol=6e-7)
+    assert table["state"].tolist() == text["state"].tolist()
