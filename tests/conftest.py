@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
+
+from olivevib.threads import use_one_thread
+
+use_one_thread(os.environ)  # before a test loads numpy: results must not hang on the cores
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
+from olivevib.comparison import ComparisonSettings, Verdict, compare
+from olivevib.comparison.fit import Seen, _jacobian, fit_clock, procrustes
+from olivevib.comparison.forward import nuisance, sensor_motion
+from olivevib.signals import Samples
 from olivevib.studies.vibration.records import (
     Logger,
     Shaker,
@@ -14,11 +19,6 @@ from olivevib.studies.vibration.records import (
     sensor,
     truth,
 )
-
-from olivevib.comparison import ComparisonSettings, Verdict, compare
-from olivevib.comparison.fit import Seen, _jacobian, fit_clock, procrustes
-from olivevib.comparison.forward import nuisance, sensor_motion
-from olivevib.signals import Samples
 
 EXPOSURE = 0.008
 SETTINGS = ComparisonSettings(exposure_s=EXPOSURE)

@@ -7,7 +7,7 @@ import pytest
 
 from olivevib.geometry import apply_homography
 from olivevib.studies import Effort
-from olivevib.studies.detection import accuracy, clutter, hardship, speed
+from olivevib.studies.detection import accuracy, clutter, follow, hardship, speed
 from olivevib.studies.detection.bound import centre_bound_px
 from olivevib.studies.detection.canvas import (
     CLEAR,
@@ -110,7 +110,7 @@ def test_mean_effects_of_a_plan():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("run", [accuracy.run, hardship.blur, clutter.run, speed.run])
+@pytest.mark.parametrize("run", [accuracy.run, hardship.blur, clutter.run, speed.run, follow.run])
 def test_small_runs_measure_every_goal(run):
     study = run(Effort(0.001), lambda *_: None)
     assert study.tables and study.goals

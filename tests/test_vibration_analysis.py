@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from olivevib.studies.vibration.records import Shaker, Tone, acceleration, camera, displacement, truth
 
 from olivevib.progress import Cancelled
 from olivevib.signals import Samples
+from olivevib.studies.vibration.records import (
+    Shaker,
+    Tone,
+    acceleration,
+    camera,
+    displacement,
+    truth,
+)
 from olivevib.vibration import (
     LineStatus,
     Phase,

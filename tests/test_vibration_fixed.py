@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from olivevib.studies.vibration.records import Tone, displacement
 
+from olivevib.studies.vibration.records import Tone, displacement
 from olivevib.vibration import SamplingFacts, deflection_shape, dominant_line
 from olivevib.vibration.fixed import without_camera_motion
 

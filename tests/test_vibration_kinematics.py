@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from olivevib.studies.vibration.records import Tone, displacement
 
+from olivevib.studies.vibration.records import Tone, displacement
 from olivevib.vibration import LineSettings, SamplingFacts
 from olivevib.vibration.figures import NO_LINE, figures
 from olivevib.vibration.kinematics import (

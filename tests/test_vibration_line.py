@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from olivevib.studies.vibration.records import Tone, displacement, frequency_bound, noise_for, random_tone
 
+from olivevib.studies.vibration.records import (
+    Tone,
+    displacement,
+    frequency_bound,
+    noise_for,
+    random_tone,
+)
 from olivevib.vibration import LineSettings, LineStatus, SamplingFacts, dominant_line
 from olivevib.vibration.line import fit_line
 from olivevib.vibration.sinefit import Tones, fit_sines

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from olivevib.studies.vibration.records import Tone, displacement, rotation
 
+from olivevib.studies.vibration.records import Tone, displacement, rotation
 from olivevib.vibration import LineSettings, SamplingFacts, dominant_line
 from olivevib.vibration.orbit import orbit, precession
 

@@ -6,8 +6,16 @@ import itertools
 
 import numpy as np
 import pytest
-from olivevib.studies.vibration.records import Logger, Shaker, camera, displacement, rotation, sensor, truth
 
+from olivevib.studies.vibration.records import (
+    Logger,
+    Shaker,
+    camera,
+    displacement,
+    rotation,
+    sensor,
+    truth,
+)
 from olivevib.vibration import Phase, find_phases, find_sensor_phases
 
 

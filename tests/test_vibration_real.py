@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from olivevib.studies.vibration.records import acceleration
 
 from olivevib.signals import GRAVITY_M_S2, fit_stamps
+from olivevib.studies.vibration.records import acceleration
 from olivevib.vibration import (
     LineSettings,
     LineStatus,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy import signal
-from olivevib.studies.vibration.records import Tone, displacement
 
+from olivevib.studies.vibration.records import Tone, displacement
 from olivevib.vibration import LineSettings, SamplingFacts, dominant_line
 from olivevib.vibration.transfer import frequency_response, line_ratio
 

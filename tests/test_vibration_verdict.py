@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from olivevib.studies.vibration.records import Tone, displacement
 
+from olivevib.studies.vibration.records import Tone, displacement
 from olivevib.vibration import LineStatus, SamplingFacts, dominant_line
 from olivevib.vibration.verdict import candidates, fold, judge
 

@@ -20,8 +20,8 @@ from olivevib.detection.detection import Detection
 from olivevib.detection.key import Key, change_of_shape, inside_image, make_key
 from olivevib.detection.key_fit import KeyBatch, KeyFits, batches_of, fit_keys
 from olivevib.detection.refine import Singles, point_images
-from olivevib.detection.search import Scene, search, smeared_start
-from olivevib.detection.template import LEAST_PATH_PX, Blur
+from olivevib.detection.search import Scene, patch_of, search, smeared_start
+from olivevib.detection.template import COARSE, LEAST_PATH_PX, Blur, draw_template
 from olivevib.detection.template_reader import SURE, Found
 from olivevib.geometry import homography
 from olivevib.marker import MarkerLibrary
@@ -97,7 +97,7 @@ class Follower:
         starts = {i: s for i, key in self._keys.items() if (s := self._start(scene, i, key))}
         found = self._fit_keys(grey, starts) if starts else {}
         for marker in [i for i in self.known if i not in found]:
-            one = self._by_itself(grey, marker)
+            one = self._by_itself(scene, marker)
             if one is not None:
                 found[marker] = one
         missed = [i for i in self.known if i not in found]
@@ -211,23 +211,37 @@ class Follower:
             self._drop_key(marker)
         self.known[marker] = known
 
-    def _by_itself(self, grey: Grey, marker: int) -> Detection | None:
+    def _by_itself(self, scene: Scene, marker: int) -> Detection | None:
         """One marker by all that a scan can do, from its last pose; if need be smeared."""
-        known, row = self.known[marker], self._row[marker]
+        known, row, grey = self.known[marker], self._row[marker], scene.grey
         if not plausible(known.H, self._reader.library.layout, grey.shape):
             return None
-        one = self._reader.fit(grey, known.H, (row, 0, 0), known.blur)
+        start = known.H if marker in self._keys else self._searched(scene, known, row)
+        one = self._reader.fit(grey, start, (row, 0, 0), known.blur)
         if one is None and not known.misses:
-            start = smeared_start(
+            smeared = smeared_start(
                 grey, self._reader.cards[row], known.H, self._reader.library.layout
             )
-            if start is not None:
-                one = self._reader.fit(grey, start[0], (row, 0, 0), start[1])
+            if smeared is not None:
+                one = self._reader.fit(grey, smeared[0], (row, 0, 0), smeared[1])
         if one is None:
             return None
         self._drop_key(marker)
         self.known[marker] = _after(one)
         return self._reader.detection(one)
+
+    def _searched(self, scene: Scene, known: Known, row: int) -> Floats:
+        """The pose of a marker without a key, moved to where its drawing agrees best."""
+        layout = self._reader.library.layout
+        drawn = draw_template(self._reader.cards[row], known.H, known.blur, layout.quiet, COARSE)
+        reach = SEARCH_PX * (1 + known.misses)
+        place = search(scene, patch_of(drawn, layout), np.zeros(2, np.intp), reach)
+        if place is None:
+            return known.H
+        move = np.eye(3)
+        move[:2, 2] = place.moved_px
+        out: Floats = move @ known.H
+        return out
 
 
 def _after(one: Found) -> Known:

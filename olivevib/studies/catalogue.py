@@ -53,6 +53,7 @@ BENCHMARKS: tuple[Entry, ...] = (
     Entry("detection-occlusion", "covered markers", "detection.hardship:occlusion"),
     Entry("detection-blur", "motion blur in a full scan", "detection.hardship:blur"),
     Entry("detection-light", "shadows, gradients, dappled sun", "detection.hardship:light"),
+    Entry("detection-follow", "priors, motion blur and time in tracking", "detection.follow:run"),
     Entry("detection-clutter", "false markers in leaf clutter", "detection.clutter:run"),
     Entry("detection-speed", "CPU time of a full scan, beside peers", "detection.speed:run"),
     Entry("exposure", "what the exposure takes from an amplitude", "exposure:run"),

@@ -72,9 +72,16 @@ def aruco(refinement: str) -> Peer:
     return Peer(f"aruco {refinement}", _foreign(ARUCO), read)
 
 
+class _LastingTags(AprilTags):  # type: ignore[misc]
+    """A detector that is never freed: its own way of doing so frees pointers it has cut short."""
+
+    def __del__(self) -> None:
+        """Leave the memory to the end of the process."""
+
+
 def apriltag() -> Peer:
     """AprilTag 3 on 36h11, whole resolution, one thread; its centre less half a pixel."""
-    detector = AprilTags(families="tag36h11", nthreads=1, quad_decimate=1.0)
+    detector = _LastingTags(families="tag36h11", nthreads=1, quad_decimate=1.0)
 
     def read(grey: Grey) -> list[Seen]:
         return [
