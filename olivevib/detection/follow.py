@@ -38,7 +38,8 @@ class Known:
 
     H (3, 3): its last pose, centred modules to px; blur it had; noise (5, 5): autocorrelation,
     variance 1, None before it was measured; drawn_at (3, 3), drawn_blur: those of its key, None
-    where it has none; shift (2,) px and W (3, 3): where that key was last; misses: frames since.
+    where it has none; shift (2,) px and W (3, 3): where that key was last; misses: frames since;
+    excess: of the covariance by noise along edges, times.
     """
 
     H: Floats
@@ -49,6 +50,7 @@ class Known:
     shift: tuple[int, int] = (0, 0)
     W: Floats | None = None
     misses: int = 0
+    excess: float = 1.0
 
 
 class FittingReader(Protocol):
@@ -190,6 +192,7 @@ class Follower:
         px, covariance = point_images(
             H, fits.W[k], fits.covariance[k], points, (key.centre + shift, key.scale)
         )
+        covariance = self.known[marker].excess * covariance
         return Detection(
             id=marker,
             corners_px=px[1:],
@@ -251,7 +254,7 @@ def _after(one: Found) -> Known:
     smeared = blur.path_px > LEAST_PATH_PX
     alone = smeared or one.card.uneven or one.inverted or one.card.bend is not None
     drawn_at = None if alone else one.H
-    return Known(one.H, blur, noise, drawn_at, blur)
+    return Known(one.H, blur, noise, drawn_at, blur, excess=max(fit.excess, 1.0))
 
 
 def _pose(key: Key, shift: NDArray[np.intp], W: Floats) -> Floats | None:

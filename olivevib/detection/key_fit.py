@@ -88,6 +88,8 @@ class _Stack:
         self.scale = np.array([key.scale for key in keys])
         samples = np.array([key.template.samples for key in keys])
         self.step = (self.scale * samples).astype(np.float32)[:, None]
+        variances = [key.template.blur.variance_px2 for key in keys]
+        self.spread = (np.array(variances) / self.scale).astype(np.float32)[:, None]
         offset = [(k.centre - k.template.origin_px) * k.template.samples for k in keys]
         self.offset = np.array(offset, np.float32)[:, :, None]
 
@@ -165,6 +167,7 @@ class _Pass:
         self.T = texture[0] + further * texture[3]
         ground = light[:, 0] + light[:, 1] * X + light[:, 2] * Y
         self.residual = level - ground - gain * self.T
+        self.residual -= stack.spread * (light[:, 4] * texture[1] + light[:, 5] * texture[2])
         self.J = _jacobian(stack, reads, gain, self.T)
         self.weight = stack.used
         if robust:
@@ -197,6 +200,8 @@ def _jacobian(stack: _Stack, reads: _Reads, gain: Singles, T: Singles) -> Single
     J[:, 8], J[:, 9], J[:, 10], J[:, 11] = 1, X, Y, T
     np.multiply(X, T, out=J[:, 12])
     np.multiply(Y, T, out=J[:, 13])
+    J[:, 12] += stack.spread * reads.texture[1]  # light falls on the marker before the blur
+    J[:, 13] += stack.spread * reads.texture[2]
     np.multiply(gain, reads.texture[3], out=J[:, 14])
     return J
 

@@ -25,14 +25,26 @@ LEAST_FLAT = 0.1  # noise variance away from edges, of the mean, at least
 
 def noise_covariance(
     pixels: Pixels, E: Singles, residual: Singles, clear: Bools, slope2: Singles
-) -> tuple[Floats, Singles]:
+) -> tuple[Floats, Singles, float]:
     """Covariance (8, 8) of estimates Σ E(x) r(x), E (8, N), from the residuals that are clear.
 
-    And the noise itself: its autocorrelation, variance in the middle. slope2 (N,): squared slope of
-    the fitted image, in any unit.
+    And the noise itself: its autocorrelation as if it were alike everywhere, variance in the
+    middle, and how many times larger its being larger along edges makes the covariance.
+    slope2 (N,): squared slope of the fitted image, in any unit.
     """
+    alike, kernel = _covariance(pixels, E, residual, clear)
     uneven = edge_noise(residual, slope2, clear)
-    E, residual = E * uneven, residual / uneven
+    if (uneven == 1).all():
+        return alike, kernel, 1.0
+    C, _ = _covariance(pixels, E * uneven, residual / uneven, clear)
+    excess = float((C[2, 2] + C[5, 5]) / (alike[2, 2] + alike[5, 5]))  # of a shift
+    return C, kernel, excess
+
+
+def _covariance(
+    pixels: Pixels, E: Singles, residual: Singles, clear: Bools
+) -> tuple[Floats, Singles]:
+    """Covariance (8, 8) of Σ E(x) r(x) and the residuals' autocorrelation."""
     left, top = int(pixels.x.min()) - LAGS, int(pixels.y.min()) - LAGS
     shape = (int(pixels.y.max()) - top + LAGS + 1, int(pixels.x.max()) - left + LAGS + 1)
     at = (pixels.y - top) * shape[1] + (pixels.x - left)

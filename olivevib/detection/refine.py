@@ -35,14 +35,15 @@ LIGHT_ROUNDS = 6  # of robust weights and light in turn
 class Fit:
     """A fitted marker.
 
-    H (3, 3): centred modules to px; image, weights (N,): levels that it predicts at
-    the pixels, and their robust weights; to_template (3, 3): homography in normalised coordinates
-    X = (x - centre)/scale; covariance (8, 8) of its first eight entries, noise
-    (5, 5) autocorrelation of the pixels' noise; gain grey levels between
-    dark and white at the centre; rms of the residual, grey levels; further (S,): variances to
-    add to the template's blur, px²; weight: mean robust weight; cells (3, 3): mean weight of each
-    ninth of the marker; ncc, whole_ncc: correlation of image and template where the marker is
-    clear, and on all of it; converged: the last pass moved nothing.
+    H (3, 3): centred modules to px; image, weights (N,): levels that it predicts at the pixels, and
+    their robust weights; to_template (3, 3): homography in normalised coordinates
+    X = (x - centre)/scale; covariance (8, 8) of its first eight entries; noise (5, 5):
+    autocorrelation of the pixels' noise, excess: how many times larger its being larger along edges
+    makes the covariance; gain grey levels between dark and white at the centre; rms of the
+    residual, grey levels; further (S,): variances to add to the template's blur, px²; weight: mean
+    robust weight; cells (3, 3): mean weight of each ninth of the marker; ncc, whole_ncc:
+    correlation of image and template where the marker is clear, and on all of it; converged: the
+    last pass moved nothing.
     """
 
     H: Floats
@@ -51,6 +52,7 @@ class Fit:
     to_template: Floats
     covariance: Floats
     noise: Singles
+    excess: float
     centre: Floats
     scale: float
     gain: float
@@ -182,7 +184,7 @@ def fit_template(template: Template, pixels: Pixels) -> Fit | None:
     counts = np.maximum(np.bincount(pixels.cell, minlength=9), 1)
     estimate = (inverse[:8].astype(np.float32) @ (WJ / np.sqrt(pixels.trust))).astype(np.float32)
     slope2 = end.J[2] ** 2 + end.J[5] ** 2  # by a shift along x, along y
-    covariance, noise = noise_covariance(pixels, estimate, whitened, clear, slope2)
+    covariance, noise, excess = noise_covariance(pixels, estimate, whitened, clear, slope2)
     return Fit(
         H=H / H[2, 2],
         image=pixels.level - end.residual,
@@ -190,6 +192,7 @@ def fit_template(template: Template, pixels: Pixels) -> Fit | None:
         to_template=end.state.W,
         covariance=covariance,
         noise=noise,
+        excess=excess,
         centre=pixels.centre,
         scale=pixels.scale,
         gain=float(end.state.light[3]),

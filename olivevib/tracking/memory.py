@@ -25,6 +25,7 @@ def pack_known(known: dict[int, Known]) -> dict[str, Any]:
             "shift": list(one.shift),
             "W": None if one.W is None else hexed(one.W),
             "misses": one.misses,
+            "excess": hexed([one.excess]),
         }
         for i, one in known.items()
     }
@@ -47,6 +48,7 @@ def _known(one: dict[str, Any]) -> Known:
         shift=(int(x), int(y)),
         W=None if one["W"] is None else unhexed(one["W"], (3, 3)),
         misses=int(one["misses"]),
+        excess=float.fromhex(one["excess"][0]),
     )
 
 
