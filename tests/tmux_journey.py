@@ -10,16 +10,19 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from tui_journey import KEYS, WAIT, check_outcome, raw_workspace
 
 NAMES = {"enter": "Enter", "escape": "Escape", "down": "Down", "ctrl+o": "C-o", "ctrl+s": "C-s"}
 BUSY = "Esc cancels"
-SIGNS = {"n": "Make the trial", "ctrl+o": "take it", "c": "Difference"}
-PATIENCE_S = 400.0
+FAILED = "This did not work"
+SIGNS = {"n": "Make the trial", "ctrl+o": "take it", "c": "Difference", "v": "▶1"}
+MADE = ("trial.toml", "comparison.h5", "report.html", "exports/T01.dxf")  # the works in turn
+PATIENCE_S = 150.0
 CHANGE_S = 2.0
-QUIET_S = 0.4  # a screen that has not changed for so long is finished
+QUIET_S = 0.3  # a screen that has not changed for so long is finished
 
 
 class Tmux:
@@ -50,6 +53,10 @@ class Tmux:
         """What is on screen."""
         return self._tmux("capture-pane", "-p")
 
+    def coloured(self) -> str:
+        """What is on screen, with its colours: where the focus is."""
+        return self._tmux("capture-pane", "-p", "-e")
+
     def press(self, key: str) -> None:
         """Press a key or type a text."""
         if key.startswith("text:"):
@@ -58,24 +65,31 @@ class Tmux:
             self._tmux("send-keys", NAMES.get(key, key))
 
     def settled(self, was: str) -> str:
-        """The screen once it has changed from ``was`` and then stays, or shows work."""
+        """The screen with its colours once it differs from ``was`` and then stays, or works."""
         began = time.monotonic()
-        while self.screen() == was and time.monotonic() - began < CHANGE_S:
+        while self.coloured() == was and time.monotonic() - began < CHANGE_S:
             time.sleep(0.05)
-        before, since = self.screen(), time.monotonic()
+        before, since = self.coloured(), time.monotonic()
         while time.monotonic() - since < QUIET_S:
             time.sleep(0.05)
-            now = self.screen()
+            now = self.coloured()
             if now != before and BUSY not in now:
                 before, since = now, time.monotonic()
         return before
 
-    def until(self, words: str, gone: bool = False) -> str:
-        """The screen once it shows (or no longer shows) these words."""
+    def until(self, words: str) -> str:
+        """The screen once it shows these words."""
+        return self._wait(words, lambda now: words in now)
+
+    def worked(self, file: Path) -> str:
+        """The screen once the work that writes this file has ended: however late it began."""
+        return self._wait(file.name, lambda now: BUSY not in now and file.is_file())
+
+    def _wait(self, what: str, done: Callable[[str], bool]) -> str:
         began = time.monotonic()
-        while (words in (now := self.screen())) == gone:
-            if time.monotonic() - began > PATIENCE_S:
-                raise TimeoutError(f"{words!r} after {PATIENCE_S:g} s:\n{now}")
+        while not done(now := self.screen()):
+            if FAILED in now or time.monotonic() - began > PATIENCE_S:
+                raise AssertionError(f"{what!r} did not come:\n{now}")
             time.sleep(0.1)
         return now
 
@@ -83,22 +97,23 @@ class Tmux:
 def journey(folder: Path, size: tuple[int, int], show: bool = False) -> list[str]:
     """Go the whole way in ``folder``; every screen on it."""
     raw_workspace(folder)
+    works, began = iter(MADE), time.monotonic()
     screens = []
     with Tmux(folder, size) as tmux:
         screens.append(tmux.until("No trials here yet"))
+        colours = tmux.coloured()
         for key in KEYS:
             if key == WAIT:
-                time.sleep(2.0)
-                tmux.until(BUSY, gone=True)
+                tmux.worked(folder / "trials" / "T01" / next(works))
             else:
                 tmux.press(key)
             if key in SIGNS:
                 tmux.until(SIGNS[key])
-            screens.append(tmux.settled(screens[-1]))
+            colours = tmux.settled(colours)
+            screens.append(tmux.screen())
             if show:
-                print(f"== {key}\n{screens[-1]}", flush=True)
-            if "This did not work" in screens[-1]:
-                raise AssertionError(screens[-1])
+                print(f"== {key} {time.monotonic() - began:.1f} s\n{screens[-1]}", flush=True)
+            assert FAILED not in screens[-1], screens[-1]
     check_outcome(folder)
     return screens
 
