@@ -22,7 +22,13 @@ class LocalServer(Server):  # type: ignore[misc]  # textual-serve has no types t
     """Serves an app, a process a window."""
 
     def __init__(self, command: str, host: str, port: int) -> None:
-        super().__init__(command, host=host, port=port, title="olivevib", templates_path=PAGES)
+        place = f"[{host}]" if ":" in host else host
+        super().__init__(
+            *(command, host, port, "olivevib", f"http://{place}:{port}"), templates_path=PAGES
+        )
+
+    async def on_startup(self, app: web.Application) -> None:
+        """Say nothing: the verb has told where the app is."""
 
     async def _make_app(self) -> web.Application:
         app: web.Application = await super()._make_app()
