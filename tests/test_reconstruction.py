@@ -231,3 +231,26 @@ def test_motion_that_the_frames_do_not_follow_tells_no_offset():
 def test_a_marker_at_rest_tells_no_offset():
     left, right = late_tracks(lambda _: np.array([50.0, 20, 1400]), 0.004, 0.0, 0.05)
     assert clock_from_motion([left], [right], rig(), TrialClock()).source == "unknown"
+
+
+def test_frame_times_stand_where_a_marker_was_hardly_seen():
+    """Frames before and after the only sight of a marker keep their own times."""
+    t = np.arange(12) / 6
+    left, right = (track(side, t, slow, 2.5e-5) for side in ("left", "right"))
+    height = rig().left.size_px[1]
+    hidden = np.arange(12) != 5
+    rare = []
+    for one in (left, right):
+        row = np.where(hidden, np.nan, one.raw_row)
+        raw = one.t_s - 2.5e-5 * one.raw_row
+        blank = {
+            name: np.where(hidden.reshape(-1, *[1] * (getattr(one, name).ndim - 1)), np.nan,
+                           getattr(one, name))
+            for name in ("corners_px", "corners_cov_px2", "centre_px", "centre_cov_px2")
+        }  # fmt: skip
+        state = np.where(hidden, int(State.LOST), one.state)
+        seen_s = raw + 2.5e-5 * np.where(hidden, height / 2, one.raw_row)
+        rare.append(replace(one, raw_row=row, t_s=seen_s, state=state, **blank))
+    clock = TrialClock(left_row_time_s=2.5e-5, right_row_time_s=2.5e-5)
+    found = reconstruct([rare[0]], [rare[1]], rig(), clock, {left.id: CORNERS}).trajectory
+    assert np.abs(found.t_s - t).max() < 1e-9

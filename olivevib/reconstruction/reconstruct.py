@@ -88,7 +88,8 @@ def reconstruct(
         pair = (by_left.get(marker), by_right.get(marker))
         columns.append(_marker(pair, base, rig, clock, corners_mm[marker], settings))
     tick(len(ids), len(ids), "triangulated")
-    return _gather(ids, columns, base, clock, settings)
+    t_s = _row_zero_times(base, clock, rig.left.size_px[1] / 2)
+    return _gather(ids, columns, t_s, clock, settings)
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,7 @@ def _joint_state(a: View, b: View, points: Points) -> Ints:
 def _gather(
     ids: list[int],
     columns: list[_Column],
-    base: Track,
+    t_s: Floats,
     clock: TrialClock,
     settings: ReconstructionSettings,
 ) -> Reconstruction:
@@ -158,7 +159,7 @@ def _gather(
     covariance = np.stack([c.points.covariance_mm2 for c in columns], axis=1) * scale**2
     rms = _rms(epipolar)
     trajectory = Trajectory(
-        t_s=_row_zero_times(base, clock),
+        t_s=t_s,
         ids=np.array(ids, dtype=np.int64),
         sample_t_s=np.stack([c.sample_t_s for c in columns], axis=1),
         xyz_mm=np.stack([c.points.xyz_mm for c in columns], axis=1),
@@ -174,14 +175,14 @@ def _gather(
     return Reconstruction(trajectory, clock, scale, rms, _cautions(rms, clock, trajectory))
 
 
-def _row_zero_times(base: Track, clock: TrialClock) -> Floats:
-    """When row 0 of each left frame was taken (Track.t_s is at the marker's own row)."""
-    rows = np.where(np.isfinite(base.raw_row), base.raw_row, np.nan)
-    seen = np.isfinite(rows)
-    if clock.left_row_time_s == 0 or not seen.any():
-        return base.t_s
-    zero = base.t_s[seen] - clock.left_row_time_s * rows[seen]
-    return np.interp(base.frame, base.frame[seen], zero)
+def _row_zero_times(base: Track, clock: TrialClock, middle_row: float) -> Floats:
+    """When row 0 of each left frame was taken.
+
+    Track.t_s is at the marker's own row, and at the middle row where it was not seen.
+    """
+    rows = np.where(np.isfinite(base.raw_row), base.raw_row, middle_row)
+    out: Floats = base.t_s - clock.left_row_time_s * rows
+    return out
 
 
 def _scale(z: Floats) -> float:
