@@ -94,9 +94,9 @@ def test_every_residual_and_view_is_told(stills):
     assert stills.poses.R.shape == (stills.poses.frame.size, 3, 3)
 
 
-def test_a_late_camera_is_corrected_and_said(video):
+def test_an_early_camera_is_corrected_and_said(video):
     assert abs(video.right_offset_s - 0.03) < max(3 * video.right_offset_sigma_s, 3e-4)
-    assert codes(video) == {"late-camera"}
+    assert codes(video) == {"early-camera"}
     assert "30" in next(c.text for c in video.cautions) and "early" in video.verdict
     assert 0 < video.reference_row < SIZE[1]
     assert np.abs(video.row_time_s * SIZE[1]).max() < 2e-3
