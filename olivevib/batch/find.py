@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from olivevib.errors import InputError, UsageError
-
-FILE = "trial.toml"  # trial.document.FILE; importing that would load every numeric room
+from olivevib.files.trial_folders import FILE
 
 
 def find_trials(names: Iterable[str], workspace: Path) -> list[Path]:

@@ -16,9 +16,9 @@ from olivevib.batch.result import TrialResult
 from olivevib.errors import InputError, OlivevibError
 from olivevib.files.atomic import write_text_atomic
 from olivevib.files.hashing import sha256_file
+from olivevib.files.trial_folders import FILE
 from olivevib.progress import Cancelled, Tick, silent
 from olivevib.trial import STAGES, Trial
-from olivevib.trial.document import FILE
 from olivevib.trial.fingerprints import RIG
 
 PAGE = "report.html"

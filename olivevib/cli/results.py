@@ -33,9 +33,9 @@ def show(arguments: argparse.Namespace, console: Console) -> int:
 
 def _list(as_json: bool) -> int:
     """Every trial of the workspace here: its quality word, and why."""
+    from olivevib.files.trial_folders import list_trials
     from olivevib.trial import Trial
     from olivevib.trial.quality import quality_of, stage_lines
-    from olivevib.trial.workspace import list_trials
 
     rows: list[dict[str, Any]] = []
     for folder in list_trials(Path()):

@@ -17,13 +17,13 @@ from olivevib.files.atomic import as_input_error
 from olivevib.files.capture import sidecar_of
 from olivevib.files.stamps import pick_camera
 from olivevib.files.stills import IMAGE_SUFFIXES
+from olivevib.files.trial_folders import FILE
 from olivevib.files.video import Video
 from olivevib.marker import load_library
 from olivevib.pipeline.libraries import only_known
 from olivevib.pipeline.recordings import SIDES, check_sizes
 from olivevib.progress import Tick, silent
 from olivevib.trial import Trial
-from olivevib.trial.document import FILE
 
 
 @dataclass(frozen=True)

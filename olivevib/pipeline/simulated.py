@@ -6,11 +6,11 @@ import shutil
 from pathlib import Path
 
 from olivevib.errors import UsageError
+from olivevib.files.trial_folders import FILE
 from olivevib.pipeline.new import NewTrial, new_trial
 from olivevib.progress import Tick, silent
 from olivevib.simulation import SimulatedTrial, scenario, simulate
 from olivevib.trial import Trial
-from olivevib.trial.document import FILE
 
 
 def truth_folder(folder: Path) -> Path:

@@ -37,6 +37,7 @@ PAPER: tuple[Entry, ...] = (
     Entry("6.3", "two toy cars on closed tracks, in step and 2 ms apart", "toy_cars:run"),
 )
 BENCHMARKS: tuple[Entry, ...] = (
+    Entry("app", "first picture, keys while a stage runs, cancelling", "app:run"),
     Entry("batch", "overhead, two workers, kill -9 and resume, memory", "seasons.batch:run"),
     Entry("blind", "frequency above the frame rate: verdict against truth, blind", "blind:run"),
     Entry("capture", "what the recorder loses, and what its checksums find", "capture.study:run"),

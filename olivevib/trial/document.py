@@ -15,9 +15,9 @@ from tomlkit.items import Table
 
 from olivevib.errors import InputError, UsageError
 from olivevib.files.atomic import write_text_atomic
+from olivevib.files.trial_folders import FILE
 from olivevib.trial.settings import TrialSettings
 
-FILE = "trial.toml"
 REMEDY = "Correct the file with any text editor and run again; nothing that was measured is lost."
 LARGEST_BYTES = 1_000_000
 LIST_OF_TABLES = "accelerometers"  # set as a whole: [{file = "…", marker = 1}]

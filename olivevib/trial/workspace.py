@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from olivevib.errors import UsageError
-from olivevib.trial.document import FILE
+from olivevib.files.trial_folders import FILE, list_trials
 
 FOLDERS = ("trials", "reports", "markers")
 
@@ -43,8 +43,3 @@ def place_for_new(name: str, workspace: Path) -> Path:
             "Choose another name, or remove the folder yourself if it is not wanted.",
         )
     return folder
-
-
-def list_trials(workspace: Path) -> list[Path]:
-    """The trial folders of a workspace, sorted by name."""
-    return sorted(path.parent for path in (workspace / "trials").glob(f"*/{FILE}"))

@@ -115,7 +115,7 @@ def guarded(read: Callable[[], Value]) -> Value | OlivevibError:
 
 def trial_folders(workspace: Path) -> tuple[Path, ...]:
     """The trial folders of the workspace, sorted by name."""
-    from olivevib.trial.workspace import list_trials
+    from olivevib.files.trial_folders import list_trials
 
     return tuple(list_trials(workspace))
 

@@ -9,13 +9,13 @@ from pathlib import Path
 
 from olivevib.errors import UsageError
 from olivevib.files.capture import read_sidecar, sidecar_of
+from olivevib.files.trial_folders import FILE
 from olivevib.pipeline.capture.plan import Captured, CapturePlan
 from olivevib.pipeline.capture.record import RECORD
 from olivevib.pipeline.new import NewTrial, new_trial
 from olivevib.progress import Tick, silent
 from olivevib.trial import Trial
 from olivevib.trial.camera_book import CameraMode, recall, workspace_of
-from olivevib.trial.document import FILE
 
 CALIBRATION = "calibration"
 
