@@ -548,6 +548,41 @@ async def test_hostile_names_and_metadata_are_shown_harmless(workspace):
             assert not any(ord(c) < 32 for c in screen_text(app).replace("\n", ""))
 
 
+# from the trial's own page: what the other pages are opened with, and back
+NEW_PAGES = (
+    ("EditScreen", ["o"], ["escape"]),
+    ("PicturesPage", ["k", "p", "plus"], ["escape"]),
+    ("CalibrationPage", ["b"], ["escape"]),
+    ("ReportPage", ["e", "down"], ["escape"]),
+    ("EditScreen", ["escape", "o"], ["escape"]),
+    ("TrialsPage", ["d", "h"], ["h", "d"]),
+    ("CapturePage", ["c", "ctrl+r"], ["escape"]),
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [(120, 40), (80, 24)], ids=["120x40", "80x24"])
+async def test_notes_archive_parameters_and_capture_show_it_harmless_too(workspace, size):
+    shutil.rmtree(workspace / "trials")
+    evil = "\\u001b[2J\\u202e[b]" + "橄" * 10_000
+    record = f'notes = "{evil}"\nplace = "{evil}"\noperator = "{evil}"\n[tree]'
+    toml = scene.TOML.replace("[tree]", record, 1).replace('place = "Bari, plot 7"', "", 1)
+    toml = toml.replace('operator = "M. Rossi"', "", 1)
+    folder = scene.new_trial(workspace / "trials" / EVIL, toml)
+    for side in ("left", "right"):
+        scene.marker_video(folder / f"{side}.avi", 5)
+    async with started(workspace, size) as (app, pilot):
+        assert "unreadable" not in screen_text(app)
+        await press(pilot, "enter")
+        for page, there, back in NEW_PAGES:
+            await press(pilot, *there)
+            assert type(app.screen).__name__ == page, there
+            text = screen_text(app).replace("\n", "")
+            assert not any(ord(c) < 32 or c in "\u202e\u200b\u2066" for c in text), there
+            await press(pilot, *back)
+            assert app.is_running, there
+
+
 async def test_a_damaged_result_is_told_and_the_app_lives_on(workspace):
     place = workspace / "trials/2026-11-20_T04/vibration.h5"
     place.write_bytes(place.read_bytes()[:-300])
