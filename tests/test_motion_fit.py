@@ -191,3 +191,9 @@ def test_a_growing_amplitude_is_followed():
     bend = (s.motion(0, at + e) - 2 * s.motion(0, at) + s.motion(0, at - e))[:, :3] / e**2 * 1e-3
     difference = fit.evaluate(at).acceleration_m_s2[:, 0] - bend
     assert difference[:, :2].std() < 0.02 * np.abs(bend).max()
+
+
+def test_frames_too_far_apart_for_any_knots_are_refused_in_words(monkeypatch):
+    monkeypatch.setattr("olivevib.reconstruction.motion.pixels.SPACINGS_S", ())
+    with pytest.raises(ValueError, match="too few for a fit"):
+        fitted(scene(25.3))

@@ -63,6 +63,7 @@ def look(
 ) -> Pixels:
     """Choose the knots, scan the apparent frequency, measure the noise.
 
+    Raises ValueError where the frames are too far apart for any knots, or too few to tell noise.
     phase: of a line whose speed wanders, else the strongest steady line is taken out; size: its
     slowly changing amplitude, else even.
     """
@@ -81,7 +82,11 @@ def look(
         )
         trials.append((step, power, peaks, noise))
     sizes = [_size(views, t[3]) for t in trials]
-    pick = next(k for k, s in enumerate(sizes) if s <= RISE * min(sizes))
+    if not sizes or not np.isfinite(sizes).any():
+        raise ValueError(
+            f"{rate:.1f} frames/s for {span:.1f} s are too few for a fit of the motion"
+        )
+    pick = next(k for k, s in enumerate(sizes) if s <= RISE * np.nanmin(sizes))
     step, power, peaks, noise = trials[pick]
     return Pixels(step, f, power, peaks, noise, float(np.sqrt(sizes[pick])))
 
