@@ -48,7 +48,8 @@ def exposure_gain(
     if localiser != "template":
         lost = 1.0 - float(np.sinc(blur))
         return ExposureGain(1.0 - OTHER_SIGMA * lost, OTHER_SIGMA * lost)
-    columns = [np.interp(blur, BLUR, column) for column in np.array(GAIN).T]
+    square = np.square(BLUR)  # the loss grows with it
+    columns = [np.interp(blur**2, square, column) for column in np.array(GAIN).T]
     sizes = np.log(SIZES_PX)
     at = np.clip(np.log(max(amplitude_px, 1e-6)), sizes[0], sizes[-1])
     gain = float(np.interp(at, sizes, columns))

@@ -133,6 +133,7 @@ def _motion(row: MarkerMotion | None) -> dict[str, Any]:
             "displacement_pp_sigma_mm": None,
         }
     line, decided = row.line, row.line.status in KNOWN
+    proven = bool(np.isfinite(line.amplitude_sigma).any())  # else the motion itself is in doubt
     return {
         "phase": row.phase,
         "frequency_hz": known(line.f_hz) if decided else None,
@@ -146,7 +147,7 @@ def _motion(row: MarkerMotion | None) -> dict[str, Any]:
         "amplitude_sigma_mm": _axes(line.amplitude_sigma),
         "acceleration_rms_m_s2": known(row.acceleration_rms_m_s2),
         "displacement_pp_mm": known(row.displacement_pp_mm),
-        "displacement_pp_sigma_mm": known(row.displacement_pp_sigma_mm),
+        "displacement_pp_sigma_mm": known(row.displacement_pp_sigma_mm) if proven else None,
     }
 
 

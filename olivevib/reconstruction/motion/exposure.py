@@ -7,7 +7,7 @@ import numpy as np
 from olivevib.arrays import Floats
 from olivevib.reconstruction.motion.types import MotionSettings, Observations
 
-FREE = 0.05  # frequency x exposure up to which nothing is corrected (below 0.5 %)
+FREE = 0.05  # frequency x exposure up to which no gain is needed (below 0.5 %)
 MOST = 0.25  # above which no amplitude is given
 
 
@@ -29,7 +29,7 @@ def gain_shares(
     for exposure in exposures(observations):
         for h in range(1, settings.harmonics + 1):
             product = h * f_hz * exposure
-            if settings.gain is not None and FREE < product <= MOST:
+            if settings.gain is not None and 0 < product <= MOST:
                 known = settings.gain(h * f_hz, exposure, amplitude_px)
                 if known is not None:
                     share[h - 1] = max(share[h - 1], known[1] / known[0])
@@ -41,15 +41,15 @@ def blur_gains(
 ) -> tuple[Floats, str]:
     """Gains (2, H) of left and right, and why no amplitude may be given (empty: it may).
 
-    Up to f E = 0.05 the gain is 1; above it comes from ``settings.gain``, or is refused.
+    It comes from ``settings.gain``; without one it is 1 up to f E = 0.05, and refused above.
     """
     gain, why = np.ones((2, settings.harmonics)), ""
     for side, exposure in enumerate(exposures(observations)):
         for h in range(1, settings.harmonics + 1):
             product = h * f_hz * exposure
-            if product <= FREE:
-                continue
             known = None
+            if product == 0 or (settings.gain is None and product <= FREE):
+                continue
             if settings.gain is not None and product <= MOST:
                 known = settings.gain(h * f_hz, exposure, amplitude_px)
             if known is not None:
