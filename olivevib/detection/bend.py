@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Floats
+from olivevib.geometry import homography_jacobian
 
 ROUNDS = 25  # of the inversion; it contracts where the surface is seen from outside
 HORIZON = 0.97  # sine of the angle round the branch beyond which nothing is drawn
@@ -89,10 +90,8 @@ def depths_px(H: Floats) -> tuple[Floats, Floats]:
     From the lengths of a module's sides alone, as a distant camera sees them: a tilt to the left
     and to the right look alike. Both are near zero for a plane seen straight on.
     """
-    at = H[:2, 2] / H[2, 2]
-    A = (H[:2, :2] - at[:, None] * H[2, :2]) / H[2, 2]
-    G = A @ A.T
-    values, vectors = np.linalg.eigh(G)
+    A = homography_jacobian(H, [[0.0, 0.0]])[0]
+    values, vectors = np.linalg.eigh(A @ A.T)
     length = np.sqrt(max(float(values[1] - values[0]), 0.0))
     one = length * vectors[:, 0]
     return one, -one

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from olivevib.arrays import Floats, Grey
 from olivevib.detection.card_fit import EVEN, REDRAWN_PX2, SHARP, plausible
 from olivevib.detection.detection import Detection
+from olivevib.detection.fitted_points import image_homography, point_images
 from olivevib.detection.key import Key, change_of_shape, inside_image, make_key
 from olivevib.detection.key_fit import KeyBatch, KeyFits, batches_of, fit_keys
-from olivevib.detection.refine import Singles, point_images
+from olivevib.detection.refine import Singles
 from olivevib.detection.search import Scene, patch_of, search, smeared_start
 from olivevib.detection.template import COARSE, LEAST_PATH_PX, Blur, draw_template
 from olivevib.detection.template_reader import SURE, Found
@@ -261,9 +262,7 @@ def _pose(key: Key, shift: NDArray[np.intp], W: Floats) -> Floats | None:
     """Pose (3, 3) of a key moved by ``shift`` and seen through W; None where W folds over."""
     if not np.isfinite(W).all() or abs(np.linalg.det(W)) < 1e-6:
         return None
-    x, y = key.centre
-    N = np.array([[1, 0, -x], [0, 1, -y], [0, 0, key.scale]]) / key.scale
     move = np.array([[1, 0, shift[0]], [0, 1, shift[1]], [0, 0, 1.0]])
-    H = move @ np.linalg.inv(N) @ np.linalg.inv(W) @ N @ key.H
+    H = move @ image_homography(W, (key.centre, key.scale)) @ key.H
     out: Floats = H / H[2, 2]
     return out

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Floats, Grey
+from olivevib.detection.fitted_points import image_homography
 from olivevib.detection.noise import noise_covariance
 from olivevib.detection.template import REACH, Blur, Template
 from olivevib.geometry import apply_homography
@@ -159,7 +160,7 @@ def approach(
         return None
     if _correlation(end.T, pixels.level) < least_ncc:
         return None
-    H = _from_template(pixels, end.state.W) @ template.H
+    H = image_homography(end.state.W, (pixels.centre, pixels.scale)) @ template.H
     return H / H[2, 2], end.state.further
 
 
@@ -179,7 +180,7 @@ def fit_template(template: Template, pixels: Pixels) -> Fit | None:
         return None
     whitened = np.asarray(end.residual * np.sqrt(pixels.trust), dtype=np.float32)
     rms = float(np.sqrt((whitened[clear] ** 2).sum() / (clear.sum() - unknowns)))
-    H = _from_template(pixels, end.state.W) @ template.H
+    H = image_homography(end.state.W, (pixels.centre, pixels.scale)) @ template.H
     even = _in_even_light(pixels, end.state)
     counts = np.maximum(np.bincount(pixels.cell, minlength=9), 1)
     estimate = (inverse[:8].astype(np.float32) @ (WJ / np.sqrt(pixels.trust))).astype(np.float32)
@@ -351,52 +352,3 @@ def _add(state: _State, change: Floats) -> None:
 def _correlation(a: Singles, b: Singles) -> float:
     a, b = a - a.mean(), b - b.mean()
     return float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9))
-
-
-def _from_template(pixels: Pixels, W: Floats) -> Floats:
-    """The homography (3, 3) from template to image, px, of W in normalised coordinates."""
-    N = np.array([[1, 0, -pixels.centre[0]], [0, 1, -pixels.centre[1]], [0, 0, pixels.scale]])
-    N = N / pixels.scale
-    out: Floats = np.linalg.inv(N) @ np.linalg.inv(W) @ N
-    return out
-
-
-def point_jacobian(H: Floats, W: Floats, points: Floats, frame: tuple[Floats, float]) -> Floats:
-    """Derivative (N, 2, 8), px, of the images of fixed module points (N, 2) by W's first entries.
-
-    H (3, 3): pose; W (3, 3) from image to template; both in X = (x - centre)/scale of ``frame``.
-    """
-    centre, scale = frame
-    x = apply_homography(H, points)
-    X, Y = ((x - centre) / scale).T
-    w = W[2, 0] * X + W[2, 1] * Y + W[2, 2]
-    Xt = (W[0, 0] * X + W[0, 1] * Y + W[0, 2]) / w
-    Yt = (W[1, 0] * X + W[1, 1] * Y + W[1, 2]) / w
-    Q = np.zeros((len(points), 2, 8))
-    Q[:, 0, 0] = Q[:, 1, 3] = X
-    Q[:, 0, 1] = Q[:, 1, 4] = Y
-    Q[:, 0, 2] = Q[:, 1, 5] = 1
-    Q[:, 0, 6], Q[:, 0, 7] = -Xt * X, -Xt * Y
-    Q[:, 1, 6], Q[:, 1, 7] = -Yt * X, -Yt * Y
-    B = np.empty((len(points), 2, 2))
-    B[:, 0, 0], B[:, 0, 1] = W[0, 0] - Xt * W[2, 0], W[0, 1] - Xt * W[2, 1]
-    B[:, 1, 0], B[:, 1, 1] = W[1, 0] - Yt * W[2, 0], W[1, 1] - Yt * W[2, 1]
-    out: Floats = np.asarray(-scale * np.linalg.solve(B, Q), dtype=np.float64)
-    return out
-
-
-def point_images(
-    H: Floats, W: Floats, covariance: Floats, points: Floats, frame: tuple[Floats, float]
-) -> tuple[Floats, Floats]:
-    """Images (N, 2), px, of centred module points (N, 2) and their covariance (2 N, 2 N), px².
-
-    covariance (8, 8) of the first entries of W; H, W, frame as in ``point_jacobian``.
-    """
-    J = point_jacobian(H, W, points, frame).reshape(2 * len(points), 8)
-    return apply_homography(H, points), J @ covariance @ J.T
-
-
-def fitted_points(fit: Fit, points: Floats) -> tuple[Floats, Floats]:
-    """Images (N, 2), px, of centred module points (N, 2) of a fit, and their covariance."""
-    frame = (fit.centre, fit.scale)
-    return point_images(fit.H, fit.to_template, fit.covariance, points, frame)

@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from olivevib.arrays import Floats, Grey
 from olivevib.detection.refine import Singles
-from olivevib.detection.template import COARSE, Blur, Template, draw_template
+from olivevib.detection.template import (
+    COARSE,
+    Blur,
+    Template,
+    draw_template,
+    module_stretches_px,
+)
 from olivevib.marker import MarkerLayout
 
 STEEP = 0.57  # share of its box that a marker fills, below which a search needs a mask
@@ -97,9 +103,7 @@ def patch_of(template: Template, layout: MarkerLayout) -> Patch:
 
 def narrowest_module_px(H: Floats) -> float:
     """The shorter stretch of a module at the centre, px."""
-    at = H[:2, 2] / H[2, 2]
-    sides = (H[:2, :2] - at[:, None] * H[2, :2]) / H[2, 2]
-    return float(np.linalg.svd(sides, compute_uv=False)[1])
+    return float(module_stretches_px(H)[1])
 
 
 def search(scene: Scene, patch: Patch, around: NDArray[np.intp], reach: int) -> Place | None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from olivevib.arrays import Bools, Floats
 from olivevib.detection.bend import Bend, bent_maps
-from olivevib.geometry import apply_homography
+from olivevib.geometry import apply_homography, homography_jacobian
 
 FINE, COARSE = 4, 2  # texture samples a pixel: to measure with, to approach with
 PIXEL_VARIANCE = 1 / 12  # px² of a pixel's own area, as a Gaussian
@@ -179,6 +179,11 @@ def _by_variances(
 
 def module_px(H: Floats) -> float:
     """Root mean square length of a module's sides at the centre, px."""
-    at = H[:2, 2] / H[2, 2]
-    sides = (H[:2, :2] - at[:, None] * H[2, :2]) / H[2, 2]
+    sides = homography_jacobian(H, [[0.0, 0.0]])[0]
     return float(np.sqrt((sides**2).sum() / 2))
+
+
+def module_stretches_px(H: Floats) -> Floats:
+    """The longer stretch of a module at the centre (its size seen straight on) and the shorter."""
+    out: Floats = np.linalg.svd(homography_jacobian(H, [[0.0, 0.0]])[0], compute_uv=False)
+    return out

@@ -17,8 +17,9 @@ from olivevib.detection.candidates import dark_passes, fine_bars
 from olivevib.detection.card_fit import EVEN, CardFit, fit_card
 from olivevib.detection.covers import without_cover
 from olivevib.detection.detection import Detection
+from olivevib.detection.fitted_points import fitted_points
 from olivevib.detection.hypotheses import Frames, frame_hypotheses, joined
-from olivevib.detection.refine import Fit, fitted_points
+from olivevib.detection.refine import Fit
 from olivevib.detection.settings import DetectionSettings
 from olivevib.detection.softcode import SoftMatch, SoftReader
 from olivevib.detection.template import Blur, card

@@ -15,7 +15,13 @@ from olivevib.arrays import Floats, Grey
 from olivevib.detection.bend import Bend, Wrapped, depths_px
 from olivevib.detection.card_fit import CardFit, blurred_pixels, plausible, rounder
 from olivevib.detection.refine import Singles, fit_template
-from olivevib.detection.template import Blur, Template, draw_template, module_px
+from olivevib.detection.template import (
+    Blur,
+    Template,
+    draw_template,
+    module_px,
+    module_stretches_px,
+)
 from olivevib.marker import MarkerLayout
 
 TRIAL_ROUNDS, ROUNDS = 2, 6  # of drawing and fitting: for each start, for the best
@@ -30,7 +36,7 @@ def fit_wrapped(
 ) -> CardFit | None:
     """Fit a bent card from a rough pose H (3, 3) of its middle; the better of both tilts."""
     free = wrapped.radius_modules is None
-    shrink = stretch_px(H) / (FOCAL_WIDTHS * grey.shape[1])
+    shrink = float(module_stretches_px(H)[0]) / (FOCAL_WIDTHS * grey.shape[1])
     starts = [
         Bend(curvature, wrapped.axis_deg, (float(depth[0]), float(depth[1])), shrink, free)
         for curvature in wrapped.curvatures
@@ -46,13 +52,6 @@ def fit_wrapped(
     best = min(first, key=lambda one: one.fit.rms / one.fit.gain)
     start = (best.blur, best.bend or starts[0])
     return _fit_bend(grey, white, best.fit.H, layout, start, free, ROUNDS)
-
-
-def stretch_px(H: Floats) -> float:
-    """The longer stretch of a module at the centre, px: its size seen straight on."""
-    at = H[:2, 2] / H[2, 2]
-    sides = (H[:2, :2] - at[:, None] * H[2, :2]) / H[2, 2]
-    return float(np.linalg.svd(sides, compute_uv=False)[0])
 
 
 def _fit_bend(

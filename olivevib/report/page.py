@@ -109,9 +109,7 @@ def page_facts(content: ReportContent, tick: Tick = silent) -> dict[str, Any]:
         "cameras": tables.camera_columns(content),
         "dropped_views": _dropped(content),
         "calibration_facts": tables.calibration_facts(content),
-        "calibration_verdict": clean(content.calibration.verdict, LONG)
-        if content.calibration
-        else "",
+        "calibration_verdict": _calibration_verdict(content),
         "timing": tables.timing_pairs(content),
         "clocks": tables.camera_clocks(content),
         "phase_rows": tables.phase_rows(content),
@@ -127,25 +125,35 @@ def page_facts(content: ReportContent, tick: Tick = silent) -> dict[str, Any]:
         "distances": _distances(content),
         "states": [s.word for s in State],
         "state_rows": tables.state_rows(content),
-        "comparisons": [
-            (
-                str(c.verdict),
-                clean(c.reason, LONG),
-                tables.comparison_pairs(content, c),
-                tables.comparison_lines(c),
-            )
-            for c in content.comparisons
-        ],
+        "comparisons": _comparisons(content),
         "frame": clean(content.trajectory.frame) if content.trajectory else "",
-        "phases": [
-            (tables.phase_word(content, p.name), f"{p.start_s:.2f} – {p.end_s:.2f}\u00a0s")
-            for p in content.phases
-            if p.name != "whole"
-        ],
+        "phases": _phases(content),
         "stages": tables.stage_rows(content),
         "command": clean(content.provenance.get("command", "")),
         "provenance": tables.provenance_pairs(content),
     }
+
+
+def _comparisons(content: ReportContent) -> list[tuple[Any, ...]]:
+    """Of each sensor: verdict, reason, its numbers, its lines."""
+    return [
+        (
+            str(c.verdict),
+            clean(c.reason, LONG),
+            tables.comparison_pairs(content, c),
+            tables.comparison_lines(c),
+        )
+        for c in content.comparisons
+    ]
+
+
+def _phases(content: ReportContent) -> list[tuple[str, str]]:
+    """Each phase and when it was."""
+    return [
+        (tables.phase_word(content, p.name), f"{p.start_s:.2f} – {p.end_s:.2f}\u00a0s")
+        for p in content.phases
+        if p.name != "whole"
+    ]
 
 
 def _calibration_verdict(content: ReportContent) -> str:
