@@ -246,6 +246,16 @@ def test_check_tells_damage_and_what_can_be_remade(videos, tmp_path):
     assert states["right.nut"] == "lost"
 
 
+def test_a_trial_toml_that_was_cut_off_is_told(videos, tmp_path):
+    trial = small_trial.make(tmp_path / "cut", videos)
+    text = (trial.folder / "trial.toml").read_text()
+    (trial.folder / "trial.toml").write_text(text[: text.index("[cameras")])
+    (finding,) = (f for f in pipeline.check(trial.folder) if f.what == "trial.toml")
+    assert finding.state == "damaged" and "no left and no right video" in finding.words
+    state = Trial.open(trial.folder).states()["track"]
+    assert state.state == "blocked" and "names no left video" in state.reason
+
+
 def test_a_mirrored_video_is_told(tmp_path):
     from olivevib.simulation.recording import MjpegWriter, jpeg
 

@@ -74,6 +74,10 @@ def _one(setup: Setup, o: Outlook, told: tuple[str, ...]) -> str:
     lines = [
         f"{o.f_hz:g} Hz, {o.amplitude_mm:g} mm peak ({o.acceleration_m_s2:.1f} m/s²): {o.status}",
         *(f"  {reason}" for reason in o.reasons),
+        f"  (planned: {setup.fps:g} frames/s, {setup.seconds:g} s, exposure "
+        f"{1e3 * setup.exposure_s:g} ms, markers of {setup.marker_mm:g} mm at "
+        f"{setup.distance_mm:g} mm, baseline {setup.baseline_mm:g} mm, focal length "
+        f"{setup.focal_px:g} px; olivevib plan --help tells how to change it)",
         "",
         f"  marker in the picture          {setup.marker_px:.1f} px high",
         f"  a plain spectrum shows it at   {o.seen_hz:.2f} Hz "

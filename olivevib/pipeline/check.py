@@ -35,13 +35,20 @@ def check(folder: Path, tick: Tick = silent) -> list[Finding]:
     except OlivevibError as error:
         return [Finding("lost", "trial.toml", f"{error}")]
     return [
-        Finding("whole", "trial.toml", ""),
+        _settings(trial),
         *_recordings(trial, tick),
         *_stamps(trial),
         *_sensors(trial),
         *_stages(trial),
         *_outputs(trial),
     ]
+
+
+def _settings(trial: Trial) -> Finding:
+    cameras = trial.settings.cameras
+    gone = [side for side in SIDES if not getattr(cameras, side).video]
+    words = f"names no {' and no '.join(gone)} video; perhaps it was cut off" if gone else ""
+    return Finding("damaged" if gone else "whole", "trial.toml", words)
 
 
 def _recordings(trial: Trial, tick: Tick) -> Iterator[Finding]:

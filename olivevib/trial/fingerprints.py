@@ -61,6 +61,13 @@ def _calibrate(folder: Path, settings: TrialSettings) -> dict[str, Path]:
 
 def _track(folder: Path, settings: TrialSettings) -> dict[str, Path]:
     left, right = settings.cameras.left, settings.cameras.right
+    for side, video in (("left", left.video), ("right", right.video)):
+        if not video:
+            raise InputError(
+                f"trial.toml names no {side} video.",
+                "Without it there is nothing to track; perhaps the file was cut off.",
+                f'Write video = "FILE" under [cameras.{side}] in trial.toml.',
+            )
     names = {"left video": left.video, "right video": right.video}
     names |= {"left stamps": left.stamps or "", "right stamps": right.stamps or ""}
     files = {name: _stampless(resolve(folder, value)) for name, value in names.items() if value}
