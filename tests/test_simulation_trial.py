@@ -249,3 +249,10 @@ def test_four_stereo_pairs_a_second_on_one_core():
         for renderer in renderers:
             jpeg(renderer.frame(n, 4.0 + n / 30), 90)
     assert pairs / (time.process_time() - before) > 4
+
+
+def test_whoever_waves_the_board_is_not_told_the_row_times():
+    """The scenario's point is that the board shows them; they must not come from the truth."""
+    told = {one.name: one.cameras.row_times_told for one in SCENARIOS}
+    assert told == {name: name != "beyond-waved" for name in told}
+    assert any(scenario("beyond-waved").cameras.row_time_s)

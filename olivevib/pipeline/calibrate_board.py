@@ -22,6 +22,7 @@ from olivevib.trial import Trial
 from olivevib.trial.records.calibration import CalibrationRecord
 
 BOARD_SHARE = 0.15  # a waved board that knows a row time no better tells none
+BOARD_FLOOR = 1e-3  # of a row time: what the solve leaves beyond its own sigma, on a rendered board
 FEW_VIEWS = 3  # a camera that shows the board less often is diagnosed
 
 
@@ -52,7 +53,7 @@ def _with_row_times(result: Calibration) -> StereoRig:
         timed = replace(
             camera,
             row_time_s=float(value),
-            row_time_sigma_s=float(sigma),
+            row_time_sigma_s=float(np.hypot(sigma, BOARD_FLOOR * value)),
             row_time_source="board",
         )
         cameras.append(timed if known else camera)

@@ -78,6 +78,7 @@ class CameraPlan:
     left: Clock = field(default_factory=Clock)
     right: Clock = field(default_factory=Clock)
     row_time_s: tuple[float, float] = (0.0, 0.0)  # 0: global shutter
+    row_times_told: bool = True  # to the technician, who writes them into the trial
 
 
 @dataclass(frozen=True)
@@ -190,6 +191,7 @@ WAVED = replace(
     name="beyond-waved",
     title="the same at 25 Hz, 9 ms apart, board waved in a video: it tells the row times",
     board=BoardPlan(views=150, video_fps=30.0),
+    cameras=replace(BEYOND.cameras, row_times_told=False),
 )
 
 RELEASE = replace(

@@ -30,8 +30,9 @@ class SimulatedTrial:
     """Where the recordings are and what the technician would tell ``olivevib new``.
 
     calibration_left, calibration_right: folders of stills, or videos. row_time_us is None under a
-    global shutter. sizes_mm: outer side of each marker's dark square by id; size_mm is their
-    median. ``stage`` holds the exact truth; the folder ``truth`` repeats it in files.
+    global shutter, and where the technician does not know it. sizes_mm: outer side of each marker's
+    dark square by id; size_mm is their median. ``stage`` holds the exact truth; the folder
+    ``truth`` repeats it in files.
     """
 
     recordings: Path
@@ -186,7 +187,7 @@ def _told(
     scenario = stage.scenario
     sizes = {m.id: m.size_mm for m in stage.markers}
     rows = scenario.cameras.row_time_s
-    sensor = scenario.sensor
+    told, sensor = scenario.cameras.row_times_told, scenario.sensor
     return SimulatedTrial(
         recordings=folder / "recordings",
         left=videos[0],
@@ -200,7 +201,7 @@ def _told(
         sizes_mm=sizes,
         places={m.id: m.place for m in stage.markers},
         shutter="rolling" if any(rows) else "global",
-        row_time_us=(rows[0] * 1e6, rows[1] * 1e6) if any(rows) else None,
+        row_time_us=(rows[0] * 1e6, rows[1] * 1e6) if any(rows) and told else None,
         exposure_ms=scenario.cameras.optics.exposure_s * 1e3,
         band_hz=scenario.band_hz,
         accelerometer=accelerometer,
