@@ -1,7 +1,8 @@
-"""What a person types, as values: id lists, bands, row times, settings."""
+"""What a person types, as values, and a value with its sigma as a person reads it."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from olivevib.errors import UsageError
@@ -74,3 +75,15 @@ def settings(pairs: list[str]) -> dict[str, Any]:
         except TOMLKitError:
             out[key.strip()] = text.strip()
     return out
+
+
+def with_sigma(value: float, sigma: float | None, digits: int) -> str:
+    """Value ± sigma with two significant digits of sigma, at most seven decimals.
+
+    Without a sigma ``digits`` decimals of the value alone.
+    """
+    if sigma is None or not math.isfinite(sigma) or sigma <= 0:
+        return f"{value:.{digits}f}"
+    places = min(7, max(0, 1 - math.floor(math.log10(sigma))))
+    small = f"< {10.0**-places:.0e}" if sigma < 10.0**-places else f"{sigma:.{places}f}"
+    return f"{value:.{places}f} ± {small}"

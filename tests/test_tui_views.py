@@ -325,6 +325,7 @@ def test_a_window_past_the_border_is_drawn_all_the_same():
 
 def test_a_frequency_never_stands_alone():
     assert frequency(12.0, 0.0012, "direct", ()) == "12.0000 ± 0.0012 Hz, direct"
+    assert frequency(12.0, 4.3e-5, "direct", ()) == "12.000000 ± 0.000043 Hz, direct"
     assert frequency(12.0, None, "confirmed", ()) == "12.0000 Hz, confirmed"
     assert frequency(5.0, 0.1, "ambiguous", (5.0, 25.0)) == "ambiguous: 5.00, 25.00 Hz"
     assert frequency(5.0, 0.1, "aliased", tuple(range(9))).endswith("4.00, … Hz")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
+
+from olivevib.values import with_sigma
 
 CANDIDATES_SHOWN = 5
 
@@ -95,15 +96,6 @@ def _markers(rows: list[dict[str, Any]]) -> list[str]:
             f"{pp} {rms}  {frequency(m)}"
         )
     return lines
-
-
-def with_sigma(value: float, sigma: float | None, digits: int) -> str:
-    """Value ± sigma with two significant digits of sigma, at most seven decimals."""
-    if sigma is None or sigma <= 0:
-        return f"{value:.{digits}f}"
-    places = min(7, max(0, 1 - math.floor(math.log10(sigma))))
-    small = f"< {10.0**-places:.0e}" if sigma < 10.0**-places else f"{sigma:.{places}f}"
-    return f"{value:.{places}f} ± {small}"
 
 
 def _has(value: float | None) -> bool:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from olivevib.values import with_sigma
+
 GLYPHS = {
     "done": "●",
     "stale": "◐",
@@ -37,8 +39,7 @@ def frequency(
     if status is None:
         return "not analysed"
     if status in DECIDED and f_hz is not None and math.isfinite(f_hz):
-        known = sigma_hz is not None and math.isfinite(sigma_hz)
-        return f"{f_hz:.4f}{f' ± {sigma_hz:.4f}' if known else ''} Hz, {status}"
+        return f"{with_sigma(f_hz, sigma_hz, 4)} Hz, {status}"
     if not candidates_hz:
         return status
     shown = ", ".join(f"{f:.2f}" for f in candidates_hz[:CANDIDATES_SHOWN])
