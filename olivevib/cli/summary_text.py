@@ -56,7 +56,11 @@ def _timing(t: dict[str, Any]) -> list[str]:
     lines = ["timing"]
     for side in ("left", "right"):
         s = t[side]
-        row = "not known" if s["row_time_s"] is None else f"{s['row_time_s'] * 1e6:.2f} µs"
+        row = "not known"
+        if s["row_time_s"] is not None:
+            sigma = s["row_time_sigma_s"]
+            micro = with_sigma(1e6 * s["row_time_s"], None if sigma is None else 1e6 * sigma, 2)
+            row = f"{micro} µs"
         lines.append(
             f"  {side:6} {s['frame_rate_hz']:.3f} frames/s, stamps scatter "
             f"{s['stamp_jitter_s'] * 1e3:.2f} ms, {s['dropped']} dropped; row time {row} "
@@ -64,9 +68,10 @@ def _timing(t: dict[str, Any]) -> list[str]:
         )
     if t["right_offset_source"]:
         offset, sigma = t["right_offset_s"], t["right_offset_sigma_s"]
-        words = "not known, taken as zero" if offset is None else f"{offset * 1e3:+.2f} ms"
-        spread = "" if offset is None or sigma is None else f" ± {sigma * 1e3:.2f} ms"
-        lines.append(f"  right camera's offset {words}{spread} ({t['right_offset_source']})")
+        words = "not known, taken as zero"
+        if offset is not None:
+            words = f"{with_sigma(1e3 * offset, None if sigma is None else 1e3 * sigma, 2)} ms"
+        lines.append(f"  right camera's offset {words} ({t['right_offset_source']})")
     return lines
 
 

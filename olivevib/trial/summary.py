@@ -88,7 +88,7 @@ def _fitted_row_time(trial: Trial, side: str) -> dict[str, Any]:
         return {}
     name = f"{side}_row_time_s"
     sigma = fit.timing.sigma(name)
-    if sigma == 0:
+    if sigma == 0 or fit.anchor.row_time_source == "global":  # there is none to be found
         return {}
     return {
         "row_time_s": getattr(fit.timing, name),
