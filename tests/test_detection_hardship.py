@@ -9,8 +9,8 @@ from rendered_markers import Canvas, Look, cover, dapple, motion, pose, shadow_e
 from test_detection_paper import LIBRARY, PLACES, places
 
 from olivevib.detection.card_fit import fit_card
+from olivevib.detection.fitted_points import fitted_points
 from olivevib.detection.noise import autocorrelation, edge_noise
-from olivevib.detection.refine import fitted_points
 from olivevib.detection.template import Blur, card
 from olivevib.detection.template_reader import TemplateReader
 from olivevib.files.prints import marker_modules
