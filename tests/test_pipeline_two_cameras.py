@@ -1,5 +1,7 @@
 """Both cameras in threads or in turn: everything is collected, errors wait, cancelling closes."""
 
+import threading
+
 import cv2
 import pytest
 
@@ -26,7 +28,7 @@ def test_every_item_is_collected_in_the_order_of_its_camera(way):
         5,
     )
     assert got == {"left": list(range(40)), "right": list(range(100, 150))}
-    assert ticks == [(n, 95, "reading") for n in range(5, 96)]
+    assert list(dict.fromkeys(ticks)) == [(n, 95, "reading") for n in range(5, 96)]
 
 
 def test_an_error_of_one_camera_waits_for_the_other(way):
@@ -64,3 +66,25 @@ def test_a_tick_that_raises_closes_both_recordings(way):
     with pytest.raises(Cancelled):
         both(makers, lambda side, item: None, impatient, None, "")
     assert sorted(closed) == ["left", "right"]
+
+
+def test_a_wish_to_stop_is_heard_within_a_frame_and_no_other_is_begun(monkeypatch):
+    monkeypatch.setattr(cv2, "getNumThreads", lambda: 2)
+    begun = {"left": 0, "right": 0}
+    end = threading.Event()
+
+    def recording(side):
+        while True:
+            begun[side] += 1
+            assert begun[side] == 1 or end.wait(20), "the tick was not called during a frame"
+            yield side
+
+    def impatient(done, total, note):
+        if begun == {"left": 2, "right": 2} and done == 2:  # both are at their second frame
+            threading.Timer(0.1, end.set).start()
+            raise Cancelled
+
+    makers = {side: lambda side=side: recording(side) for side in ("left", "right")}
+    with pytest.raises(Cancelled):
+        both(makers, lambda side, item: None, impatient, None, "")
+    assert begun == {"left": 2, "right": 2}

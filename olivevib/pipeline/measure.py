@@ -233,6 +233,6 @@ def analyse(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
         result = with_lines(result, fit)
     if reconstruction.clock.source == "unknown" and not facts.direct:
         result = _unproven(result)
-    result = replace(result, survey=surveyed(trial, trajectory, motion, result, facts))
+    result = replace(result, survey=surveyed(trial, trajectory, motion, result, facts, tick))
     write_stage(trial.folder / "vibration.h5", vibration_file(result, now))
     return result.cautions

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from olivevib.errors import Caution, UsageError
+from olivevib.progress import Tick, silent
 from olivevib.reconstruction import Trajectory
 from olivevib.signals import Samples
 from olivevib.trial import Trial
@@ -106,6 +107,7 @@ def surveyed(
     motion: Mapping[int, Samples],
     result: Vibration,
     facts: SamplingFacts,
+    tick: Tick = silent,
 ) -> Survey:
     """Orbits, rotations, decay, transmissibility, and the motions that trial.toml asks for."""
     settings = trial.settings
@@ -115,7 +117,7 @@ def surveyed(
     wanted = settings.vibration.reference
     reference = wanted if wanted is not None else next(iter(trunk), None)
     turned = attitudes(trajectory)
-    found = survey(motion, turned, lines, result.phases, shown, facts, reference)
+    found = survey(motion, turned, lines, result.phases, shown, facts, reference, tick)
     if trajectory.method == "continuous":  # fitted motions cohere because they were fitted
         found = replace(found, transmissions=tuple(_unweighed(t) for t in found.transmissions))
     asked = [

@@ -28,6 +28,7 @@ from olivevib.trial.fingerprints import PRIVATE
 from olivevib.trial.records.tracks import tracks_file
 
 LOOK_EVERY, LOOKS = 15, 8  # frames looked at in a mirror where no marker was found
+TICK_ROWS = 16  # frames read back between two ticks
 COMMIT_ROWS = 16  # frames acknowledged together: at most this much work is repeated after a crash
 
 
@@ -46,9 +47,9 @@ def track(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     journal = Journal.open(trial.folder / PRIVATE / "track.journal", key)
     try:
         notes = _measure(trial, library, infos, journal, tick)
-        seen = {side: partial(_seen, journal, side) for side in SIDES}
+        seen = {side: partial(_seen, journal, side, tick) for side in SIDES}
         empty = [side for side in SIDES if not any(s.detections for s in seen[side]())]
-        notes += tuple(c for side in empty for c in _if_mirrored(trial, library, side))
+        notes += tuple(c for side in empty for c in _if_mirrored(trial, library, side, tick))
         stored = stored_tracks(trial, library, infos, seen, notes)
     finally:
         journal.close()
@@ -59,12 +60,13 @@ def track(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     return cautions
 
 
-def _if_mirrored(trial: Trial, library: MarkerLibrary, side: str) -> Iterator[Caution]:
+def _if_mirrored(trial: Trial, library: MarkerLibrary, side: str, tick: Tick) -> Iterator[Caution]:
     """A caution where a video without any marker shows some once it is flipped left to right."""
     detector = Detector(library, trial.settings.detection)
     hits = looked = 0
     with Video.open(trial.path(getattr(trial.settings.cameras, side).video)) as video:
         for frame in video.frames():
+            tick(looked, LOOKS, "looking for mirrored markers")
             if frame.index % LOOK_EVERY or frame.grey is None:
                 continue
             looked += 1
@@ -148,9 +150,11 @@ def _observe(frame: Frame, tracker: Tracker) -> FrameObservations:
     return FrameObservations(frame.stamp_s, False, tuple(found))
 
 
-def _seen(journal: Journal, side: str) -> Iterator[FrameObservations]:
+def _seen(journal: Journal, side: str, tick: Tick) -> Iterator[FrameObservations]:
     """What every frame of one camera showed, one by one from the disk."""
-    for row in journal.rows(side):
+    for done, row in enumerate(journal.rows(side)):
+        if done % TICK_ROWS == 0:
+            tick(done, None, f"putting the {side} tracks together")
         yield unpack(row.payload)
 
 

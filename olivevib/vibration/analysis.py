@@ -78,10 +78,9 @@ def analyse(
         rows.append(_row(marker, phase, part, fit, facts))
         if phase is shown:
             found[marker] = fit
-    tick(len(jobs), len(jobs), "spectra")
     return Vibration(
         phases=phases,
-        spectra=_spectra(motion, shown, found, facts, settings),
+        spectra=_spectra(motion, shown, found, facts, settings, tick),
         table=tuple(rows),
         spectrum_phase=shown.name,
         cautions=cautions(rows, shown.name, facts),
@@ -167,6 +166,7 @@ def _spectra(
     found: Mapping[int, LineFit],
     facts: SamplingFacts,
     settings: VibrationSettings,
+    tick: Tick,
 ) -> dict[str, Spectrum]:
     """Spectra of all markers on one grid; derivatives only where no alias can lie in the band."""
     parts = {m: between(motion[m], phase.start_s, phase.end_s) for m in sorted(motion)}
@@ -174,7 +174,8 @@ def _spectra(
     f_hz = grid.f_hz if grid else np.empty(0)
     size = (f_hz.size, len(parts), 3)
     amplitude, density = np.full(size, np.nan), np.full(size, np.nan)
-    for at, part in enumerate(parts.values()):
+    for at, (marker, part) in enumerate(parts.items()):
+        tick(at, len(parts), f"spectrum of marker {marker}")
         t_s, values = measured(part)
         if grid and t_s.size >= _FEWEST:
             amplitude[:, at], density[:, at] = spectra(t_s, values, grid, shape)

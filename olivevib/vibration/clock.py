@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from olivevib.signals import Samples, fit_stamps
 EVEN = 1e-6  # of a period: nearer to an even clock than this, a record counts as even
 
 _AS_IT_STANDS = 1e-7  # periods off an even clock: rounding of the stamps
+_REMEMBERED, _LONGEST = 64, 50_000  # clocks of records no longer than that many samples
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,18 @@ def clock_of(t_s: Floats) -> Clock:
         worst = float(np.abs(t_s - (t_s[0] + period * np.arange(t_s.size))).max())
         if worst < _AS_IT_STANDS * period:
             return Clock(1 / period, t_s.size, t_s.size, worst / period)
+    if t_s.size > _LONGEST:
+        return _fitted(t_s)
+    return _remembered(np.ascontiguousarray(t_s, dtype=np.float64).tobytes())
+
+
+@lru_cache(maxsize=_REMEMBERED)
+def _remembered(times: bytes) -> Clock:
+    """The fitted clock of the same times once: an analysis asks for it again and again."""
+    return _fitted(np.frombuffer(times, dtype=np.float64))
+
+
+def _fitted(t_s: Floats) -> Clock:
     fit = fit_stamps(t_s)
     return Clock(fit.rate_hz, int(fit.sequence[-1]) + 1, t_s.size, fit.worst_s * fit.rate_hz)
 

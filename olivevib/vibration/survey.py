@@ -132,7 +132,11 @@ def survey(
         )
     of = min(motion, default=None) if reference not in motion else reference
     others = [] if of is None else [m for m in sorted(motion) if m != of]
-    between_markers = [_transmission(m, of, motion, lines, facts) for m in others if of is not None]
+    between_markers = []
+    for done, m in enumerate(others):
+        if of is not None:
+            tick(done, len(others), f"marker {m} against {of}")
+            between_markers.append(_transmission(m, of, motion, lines, facts))
     return Survey(shown.name, tuple(markers), tuple(between_markers), deflection_shape(lines))
 
 
