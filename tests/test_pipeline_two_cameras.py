@@ -70,7 +70,7 @@ def test_a_tick_that_raises_closes_both_recordings(way):
 
 def test_a_wish_to_stop_is_heard_within_a_frame_and_no_other_is_begun(monkeypatch):
     monkeypatch.setattr(cv2, "getNumThreads", lambda: 2)
-    begun = {"left": 0, "right": 0}
+    begun, got = {"left": 0, "right": 0}, []
     end = threading.Event()
 
     def recording(side):
@@ -86,5 +86,6 @@ def test_a_wish_to_stop_is_heard_within_a_frame_and_no_other_is_begun(monkeypatc
 
     makers = {side: lambda side=side: recording(side) for side in ("left", "right")}
     with pytest.raises(Cancelled):
-        both(makers, lambda side, item: None, impatient, None, "")
+        both(makers, lambda side, item: got.append(item), impatient, None, "")
     assert begun == {"left": 2, "right": 2}
+    assert sorted(got) == ["left", "left", "right", "right"]  # what was finished is kept

@@ -13,7 +13,7 @@ from typing import Generic, TypeVar
 
 import cv2
 
-from olivevib.progress import Tick
+from olivevib.progress import Cancelled, Tick
 
 Item = TypeVar("Item")
 AHEAD = 16  # items a camera may be ahead of the collector: memory stays flat
@@ -42,13 +42,22 @@ class _Worker(Generic[Item]):
             self._put(None)
 
     def _put(self, item: Item | None) -> bool:
-        while not self.stop.is_set():
+        """Hand an item over, also the last one when told to stop; False: no other is wanted."""
+        while True:
+            stopping = self.stop.is_set()
             try:
                 self.items.put(item, timeout=POLL_S)
-                return True
+                return not stopping
             except queue.Full:
-                continue
-        return False
+                if stopping:
+                    return False
+
+    def finished(self) -> Iterator[Item]:
+        """What is still in the queue once the thread has ended."""
+        while not self.items.empty():
+            item = self.items.get_nowait()
+            if item is not None:
+                yield item
 
 
 def both(
@@ -63,8 +72,9 @@ def both(
 
     makers: side -> a function that makes the iterator (called in the thread). The tick is called
     after each item and every few milliseconds between them; when it raises, both threads are
-    stopped and joined: each ends the frame that it is at, and begins no other. An error of a
-    camera is raised here, after what both cameras delivered was collected.
+    stopped and joined: each ends the frame that it is at, and begins no other. Where it is
+    cancelled, these are collected before it goes on. An error of a camera is raised here, after
+    what both cameras delivered was collected.
     """
 
     def take(side: str, item: Item) -> None:
@@ -75,7 +85,7 @@ def both(
 
     tick(done, total, note)
     if cv2.getNumThreads() > 1:
-        _in_threads(makers, take, lambda: tick(done, total, note))
+        _in_threads(makers, take, lambda: tick(done, total, note), collect)
     else:
         _in_turn(makers, take)
 
@@ -84,6 +94,7 @@ def _in_threads(
     makers: Mapping[str, Callable[[], Iterator[Item]]],
     take: Callable[[str, Item], None],
     wait: Callable[[], None],
+    keep: Callable[[str, Item], None],
 ) -> None:
     workers = [_Worker(side, make) for side, make in makers.items()]
     for worker in workers:
@@ -99,14 +110,24 @@ def _in_threads(
                     wait()
                 else:
                     take(worker.side, item)  # type: ignore[arg-type]
+    except Cancelled:
+        _stop(workers)
+        for worker in workers:
+            for item in worker.finished():
+                keep(worker.side, item)
+        raise
     finally:
-        for worker in workers:
-            worker.stop.set()
-        for worker in workers:
-            worker.thread.join()
+        _stop(workers)
     for worker in workers:
         if worker.error is not None:
             raise worker.error
+
+
+def _stop(workers: list[_Worker[Item]]) -> None:
+    for worker in workers:
+        worker.stop.set()
+    for worker in workers:
+        worker.thread.join()
 
 
 def _in_turn(

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import shutil
+import sqlite3
 import subprocess
 import tempfile
 import time
@@ -21,16 +23,20 @@ from olivevib.studies.seasons.trials import ten_markers
 from olivevib.studies.study import Effort, Goal, Study, Table
 
 if TYPE_CHECKING:
+    from olivevib.trial import Trial
     from olivevib.tui.app import OlivevibApp
+    from olivevib.tui.work import Result, Work
 
-STARTS, KEYS = 15, 200
+STARTS, KEYS, CANCELS = 15, 200, 12
 SECONDS = 8.0  # of the recording that is tracked meanwhile
+BETWEEN = 20  # frames of both cameras between two wishes to stop
 PATIENCE_S = 60.0
+STAGES = ("calibrate", "track", "reconstruct", "analyse")
 SIGN = b"quality"  # the head of the list of trials
 
 
 def run(effort: Effort, tick: Tick) -> Study:
-    """Start the app on a terminal again and again; press keys while it tracks; cancel."""
+    """Start the app on a terminal again and again; press keys while it tracks; cancel, go on."""
     with tempfile.TemporaryDirectory(prefix="olivevib_app_") as place:
         folder = Path(place) / "olive"
         trial = ten_markers(folder / "trials" / "T01", max(2.0, SECONDS * effort.share), tick)
@@ -38,23 +44,59 @@ def run(effort: Effort, tick: Tick) -> Study:
         starts = np.array(
             [_start(folder, k, effort.count(STARTS), tick) for k in range(effort.count(STARTS))]
         )
-        keys, cancel = asyncio.run(_pressed(folder, effort.count(KEYS, 20), tick))
+        gaps, whole = _undisturbed(trial, tick)
+        keys, cancels, same = asyncio.run(_pressed(folder, effort, whole, tick))
+    frames, ends = np.array(cancels.frame_s), np.array(cancels.end_s)
     wall, cpu = np.median(starts, axis=0)
     p95 = 1e3 * float(np.percentile(keys, 95))
-    rows = (
+    rows = [
         ("first picture, wall, s", float(wall), float(starts[:, 0].max())),
         ("first picture, processor, s", float(cpu), float(starts[:, 1].max())),
-        ("key while tracking, ms", 1e3 * float(np.median(keys)), 1e3 * float(keys.max())),
-        ("cancelled after, ms", 1e3 * cancel, 1e3 * cancel),
-    )
+        _row("key while tracking, ms", keys),
+        _row("from Esc to the end of tracking, ms", ends),
+        _row("one frame of both cameras, ms", frames),
+    ]
+    after = cancels.frames_after
+    rows.append(("frames of two cameras finished after Esc", float(np.median(after)), max(after)))
+    rows += [_row(f"{stage}: between two ticks, ms", gap) for stage, gap in gaps.items()]
+    within = np.median(ends) <= np.median(frames) and ends.max() <= frames.max()
+    told = f"{_spread(ends)} ms; a frame there takes {_spread(frames)} ms"
     goals = (
         Goal("first picture", "< 1 s", f"{cpu:.2f} s of processor, {wall:.2f} s wall",
              bool(min(wall, cpu) < 1)),
         Goal("key while a stage runs, 95 %", "< 20 ms", f"{p95:.1f} ms", p95 < 20),
+        Goal("cancel", "≤ one frame", told, bool(within)),
+        Goal("tracks after cancelling and going on", "bit-identical",
+             f"{'the same' if same else 'other'} bytes after {len(ends)} cancels", same),
     )  # fmt: skip
     facts = (("starts", str(len(starts))), ("keys", str(len(keys))), ("cores", str(os.cpu_count())))
-    table = Table("The app", ("what", "median", "most"), rows)
+    table = Table("The app", ("what", "median", "most"), tuple(rows))
     return Study("app", "How soon the app answers", (table,), (), goals, facts)
+
+
+def _row(what: str, seconds: np.ndarray) -> tuple[str, float, float]:
+    return what, 1e3 * float(np.median(seconds)), 1e3 * float(seconds.max())
+
+
+def _spread(seconds: np.ndarray) -> str:
+    return f"{1e3 * np.median(seconds):.0f} (at most {1e3 * seconds.max():.0f})"
+
+
+def _undisturbed(trial: Trial, tick: Tick) -> tuple[dict[str, np.ndarray], bytes]:
+    """Seconds between two ticks of each stage, nothing else being done; the tracks.
+
+    The trial is left calibrated, its tracks taken away again.
+    """
+    gaps = {}
+    for number, stage in enumerate(STAGES):
+        tick(number, len(STAGES), f"{stage}, undisturbed")
+        told = [time.monotonic()]
+        pipeline.run_stage(trial, stage, lambda *_, told=told: told.append(time.monotonic()))
+        gaps[stage] = np.diff([*told, time.monotonic()])
+    tracks = trial.folder / "tracks.h5"
+    whole = tracks.read_bytes()
+    tracks.unlink()
+    return gaps, whole
 
 
 def _start(folder: Path, number: int, total: int, tick: Tick) -> tuple[float, float]:
@@ -88,12 +130,79 @@ def _start(folder: Path, number: int, total: int, tick: Tick) -> tuple[float, fl
     return wall, spent
 
 
-async def _pressed(folder: Path, count: int, tick: Tick) -> tuple[np.ndarray, float]:
-    """Seconds of each key while the app tracks; seconds from Esc to the end of the work."""
+class Cancels:
+    """Tracking that is cancelled: how long it went on, in seconds and in frames.
+
+    end_s: from Esc until other work may start. frames_after: frames of both cameras that were
+    finished after the wish was known. frame_s: what a frame of both cameras took meanwhile.
+    """
+
+    def __init__(self) -> None:
+        self.end_s: list[float] = []
+        self.frames_after: list[int] = []
+        self.frame_s: list[float] = []
+        self._seen: dict[int, float] = {}  # frames done -> when
+
+    def watched(self, job: Work) -> Work:
+        """The same work; its frames are timed."""
+
+        def do(tick: Tick) -> Result:
+            def timed(done: int, total: int | None, note: str) -> None:
+                if note.startswith("tracking"):
+                    self._seen.setdefault(done, time.monotonic())
+                tick(done, total, note)
+
+            return job.do(timed)
+
+        self._seen = {}
+        return type(job)(job.title, do)
+
+    @property
+    def done(self) -> int:
+        """Frames of both cameras so far, those of earlier goes with them."""
+        return max(self._seen, default=0)
+
+    async def cancel(self, app: OlivevibApp, journal: Path) -> None:
+        """Press Esc and wait for the end."""
+        from textual import events
+
+        began = time.monotonic()
+        app.post_message(events.Key("escape", None))
+        while not app.cancelling and app.progress is not None:
+            await asyncio.sleep(0.001)
+        known = self.done
+        while app.progress is not None:
+            await asyncio.sleep(0.001)
+        self.end_s.append(time.monotonic() - began)
+        self.frames_after.append(_rows(journal) - known)
+        seen = self._seen
+        self.frame_s += [seen[k] - seen[k - 2] for k in seen if k - 2 in seen]
+
+
+def _rows(journal: Path) -> int:
+    """Frames that are kept."""
+    if not journal.exists():
+        raise UsageError("Tracking ended before it was cancelled.", "", "More effort.")
+    with contextlib.closing(sqlite3.connect(f"file:{journal}?mode=ro", uri=True)) as db:
+        return int(db.execute("SELECT COUNT(*) FROM row").fetchone()[0])
+
+
+async def _pressed(
+    folder: Path, effort: Effort, whole: bytes, tick: Tick
+) -> tuple[np.ndarray, Cancels, bool]:
+    """Seconds of each key while the app tracks; the cancels; whether the tracks are ``whole``.
+
+    Tracking is cancelled again and again and goes on each time; the tracks are those of the last.
+    """
+    from olivevib.tui import jobs
     from olivevib.tui.app import OlivevibApp
 
     app = OlivevibApp(folder)
     taken: list[float] = []
+    cancels = Cancels()
+    count, wishes = effort.count(KEYS, 20), effort.count(CANCELS, 4)
+    trial = folder / "trials" / "T01"
+    private, job = trial / ".olivevib", jobs.run_one(trial, "track")
     async with app.run_test(size=(120, 40)) as pilot:
         await _filled(app)
         await pilot.press("enter")
@@ -104,11 +213,21 @@ async def _pressed(folder: Path, count: int, tick: Tick) -> tuple[np.ndarray, fl
             await _until(app, running=True)
             while app.progress is not None and len(taken) < count:
                 taken.append(await _answered_s(app, ("down", "up")[len(taken) % 2]))
-        began = time.monotonic()
-        await pilot.press("escape")
-        with contextlib.suppress(TimeoutError):
-            await _until(app, running=False)
-        return np.array(taken), time.monotonic() - began
+        app.action_cancel_work()
+        await _until(app, running=False)
+        shutil.rmtree(private, ignore_errors=True)  # and from the first frame again
+        for number in range(wishes):
+            tick(number, wishes, "cancelling")
+            app.start(cancels.watched(job))
+            await _until(app, running=True)
+            began = cancels.done
+            while app.progress is not None and cancels.done < began + BETWEEN:
+                await asyncio.sleep(0.003)
+            await cancels.cancel(app, private / "track.journal")
+        app.start(job)
+        await _until(app, running=True)
+        await _until(app, running=False)
+    return np.array(taken), cancels, (trial / "tracks.h5").read_bytes() == whole
 
 
 async def _filled(app: OlivevibApp) -> None:
@@ -123,8 +242,11 @@ async def _filled(app: OlivevibApp) -> None:
 
 
 async def _until(app: OlivevibApp, running: bool) -> None:
+    """Wait until frames are being tracked; or until no work runs any more."""
     async with asyncio.timeout(PATIENCE_S):
-        while (app.progress is not None and app.progress.done > 2) != running:
+        while running and not (app.progress is not None and app.progress.done > 2):
+            await asyncio.sleep(0.002)
+        while not running and app.progress is not None:
             await asyncio.sleep(0.002)
 
 
