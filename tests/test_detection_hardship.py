@@ -8,10 +8,10 @@ import pytest
 from rendered_markers import Canvas, Look, cover, dapple, motion, pose, shadow_edge
 from test_detection_paper import LIBRARY, PLACES, places
 
-from olivevib.detection.card_fit import fit_card
+from olivevib.detection.card_fit import blurred_pixels, fit_card
 from olivevib.detection.fitted_points import fitted_points
 from olivevib.detection.noise import autocorrelation, edge_noise
-from olivevib.detection.template import Blur, card
+from olivevib.detection.template import Blur, card, draw_template
 from olivevib.detection.template_reader import TemplateReader
 from olivevib.files.prints import marker_modules
 from olivevib.geometry import apply_homography, homography
@@ -219,8 +219,29 @@ def test_false_matches_are_as_rare_as_stated():
     assert matches == pytest.approx(false_match_probability(library, 11), rel=0.15)
 
 
-def test_blur_reaches_half_its_path_and_two_sigma():
-    assert Blur(1.0, (3.0, 4.0)).half_width_px == pytest.approx(4.5)
+def test_a_pixel_counts_where_its_whole_path_lies_on_the_card():
+    grey = np.zeros((200, 200), np.uint8)
+    H = np.array([[5.0, 0, 100], [0, 5.0, 100], [0, 0, 1]])
+    blur = Blur(1.0, (12.0, 0.0))
+    still, moved = (blurred_pixels(grey, H, b, LIBRARY.layout) for b in (Blur(1.0), blur))
+    edge = 5 * (5.5 + 2) - 2 * 1.0  # card, less two sigma
+    assert abs(still.x - 100).max() == abs(still.y - 100).max() == 30  # 0.6 modules about it
+    assert abs(moved.x - 100).max() == int(edge - 6)
+    assert abs(moved.y - 100).max() == 30  # nothing is lost across the motion
+
+
+def test_a_path_is_drawn_with_its_own_derivatives():
+    """The textures by the path's x and y say what a slightly longer path looks like."""
+    white = card(LIBRARY.layout.pattern(LIBRARY.codes[0]), 2)
+    H = np.array([[4.4, 0.3, 60], [-0.4, 4.2, 60], [0, 0, 1]])
+    drawn = draw_template(white, H, Blur(motion_px=(9.0, 5.0)))
+    assert drawn.moving
+    for axis, longer in enumerate(((9.6, 5.0), (9.0, 5.6))):
+        change = draw_template(white, H, Blur(motion_px=longer)).texture[..., 0]
+        change = (change - drawn.texture[..., 0])[8:-8, 8:-8]
+        linear = 0.6 * drawn.texture[8:-8, 8:-8, 4 + axis]
+        assert np.abs(change - linear).max() < 0.25 * np.abs(change).max()
+        assert np.vdot(change, linear) > 0.97 * np.linalg.norm(change) * np.linalg.norm(linear)
 
 
 def test_a_gradient_of_light_is_blurred_with_the_marker():

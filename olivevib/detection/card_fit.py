@@ -9,12 +9,19 @@ import numpy as np
 from olivevib.arrays import Floats, Grey
 from olivevib.detection.bend import Bend
 from olivevib.detection.refine import Fit, Pixels, Singles, approach, fit_template, marker_pixels
-from olivevib.detection.template import COARSE, REACH, Blur, draw_template, module_px
+from olivevib.detection.smear import further_blur, motion_of, rounder
+from olivevib.detection.template import (
+    COARSE,
+    LEAST_PATH_PX,
+    REACH,
+    Blur,
+    draw_template,
+    module_px,
+)
 from olivevib.detection.uneven import closed_light, template_light
 from olivevib.geometry import apply_homography
 from olivevib.marker import MarkerLayout
 
-VARIANCES_PX2 = (0.15, 6.0)  # blur that is believed
 REDRAWN_PX2 = 0.12  # change of the blur that asks for a new drawing
 COARSE_PX = 15.0  # centre to corner for each pixel of stride in the first fit
 EVEN = 0.05  # rms over gain of a marker in even light, covered parts left out
@@ -23,8 +30,10 @@ BETTER = 0.7  # of that rms: what evening out the light must achieve to be belie
 ROUNDS = 3  # of light and fit in turn
 UNEVEN_VARIANCE = 2.5  # covariance of fits in uneven light, times; set on rendered shadows
 MOVING_PX2 = 0.9  # variance of the blur from which a motion is looked for
-ELONGATED_PX2 = 0.3  # difference of the blur's two variances that is a motion
-MOTION_ROUNDS = 3
+DRAWN = (2, 10)  # drawings at most: of a still marker, of one that moved
+LONGER = (1.0, 1.7)  # starts: of the path that the blur's moments show
+REDRAWN_PATH_PX = 0.3  # change of a path that asks for a new drawing
+REDRAWN_SHAPE_PX = 0.3  # at the corners, of a marker that moved
 BEYOND = 0.25  # image sizes by which a marker's card may leave the image
 WIDEST_PX = 900.0  # of a marker's card
 SHARP = Blur()  # of a good lens in focus
@@ -38,6 +47,11 @@ class CardFit:
     blur: Blur
     uneven: bool = False
     bend: Bend | None = None
+
+    @property
+    def noise(self) -> float:
+        """What the drawing leaves unexplained: rms over gain."""
+        return self.fit.rms / self.fit.gain
 
 
 def fit_card(
@@ -54,58 +68,71 @@ def fit_card(
     if pixels is None:
         return None
     found = approach(draw_template(white, H, blur, layout.quiet, COARSE), pixels)
-    one = None if found is None else _fine(grey, white, layout, found[0], _further(blur, found[1]))
-    if one is not None and one.fit.rms <= EVEN * one.fit.gain:
-        return one
-    if one is not None and (one.blur.variance_px2 > MOVING_PX2 or one.blur.path_px > 0):
+    one = (
+        None
+        if found is None
+        else _fine(grey, white, layout, found[0], further_blur(blur, found[1]))
+    )
+    if one is not None and one.blur.variance_px2 > MOVING_PX2 and one.blur.path_px == 0:
         one = _moving(grey, white, layout, one)
-        if one.fit.rms <= EVEN * one.fit.gain:
-            return one
+    if one is not None and one.blur.path_px > 0 and one.noise > EVEN:
+        one = _moving(grey, white, layout, one)
+    if one is not None and one.noise <= EVEN:
+        return one
     even = _even(grey, white, H, layout, pixels)
     if one is None or even is None:
         return even or one
-    return even if _noise(even) < BETTER * _noise(one) else one
+    return even if even.noise < BETTER * one.noise else one
 
 
 def _fine(
     grey: Grey, white: Singles, layout: MarkerLayout, H: Floats, blur: Blur
 ) -> CardFit | None:
-    """Draw where the marker was found and fit all pixels; once more if the blur was other."""
+    """Draw where the marker was found and fit all pixels; anew while the blur is another."""
     one = None
-    for _ in range(2):
+    for step in range(DRAWN[1]):
         pixels = blurred_pixels(grey, H, blur, layout)
         fit = pixels and fit_template(draw_template(white, H, blur, layout.quiet), pixels)
         if not fit:
             return None
-        wider = _further(blur, fit.further)
+        wider = further_blur(blur, fit.further)
         one = CardFit(fit, wider)
-        if abs(fit.further[0]) < REDRAWN_PX2:
-            break
+        if _settled(fit) or (step + 1 >= DRAWN[0] and blur.path_px <= LEAST_PATH_PX):
+            return one
         H, blur = fit.H, wider
-    return one
+    return one and replace(one, fit=replace(one.fit, converged=False))
+
+
+def _settled(fit: Fit) -> bool:
+    """Whether blur and, of what moves, path and shape were drawn as the fit found them."""
+    if abs(fit.further[0]) >= REDRAWN_PX2:
+        return False
+    path = float(np.hypot(*fit.further[1:])) if fit.further.size == 3 else 0.0
+    turned = fit.to_template[:, :2] - np.eye(3)[:, :2]
+    moved = fit.scale * float(np.abs(turned).max()) if fit.further.size == 3 else 0.0
+    return path < REDRAWN_PATH_PX and moved < REDRAWN_SHAPE_PX
 
 
 def _moving(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit) -> CardFit:
     """The same marker with a motion path where its blur is longer than wide; ``one`` if not."""
-    H, blur = one.fit.H, one.blur
+    H, blur = one.fit.H, replace(one.blur, motion_px=(0.0, 0.0))
     pixels = blurred_pixels(grey, H, blur, layout)
     template = draw_template(white, H, blur, layout.quiet, moments=True)
     fit = pixels and fit_template(template, pixels)
     if not fit:
         return one
-    moving = _motion(blur, fit.further)
     best = one
-    for _ in range(MOTION_ROUNDS):
-        if moving.path_px == 0:
-            return best
-        H = fit.H
-        pixels = blurred_pixels(grey, H, moving, layout)
-        fit = pixels and fit_template(draw_template(white, H, moving, layout.quiet), pixels)
-        if not fit:
-            return best
-        moving = _longer(moving, fit.further)
-        if fit.rms / fit.gain < _noise(best):
-            best = CardFit(fit, moving)
+    start = motion_of(blur, fit.further)
+    for longer in LONGER:
+        if start.path_px <= LEAST_PATH_PX:
+            break
+        x, y = start.motion_px
+        start = replace(start, motion_px=(longer * x, longer * y))
+        moving = _fine(grey, white, layout, fit.H, start)
+        if moving is not None and moving.noise < best.noise:
+            best = moving
+        if best.noise <= EVEN:
+            break
     return best
 
 
@@ -157,47 +184,10 @@ def blurred_pixels(grey: Grey, H: Floats, blur: Blur, layout: MarkerLayout) -> P
     """All pixels of the marker that nothing beyond its card is smeared into; None if H is wild."""
     if not plausible(H, layout, grey.shape):
         return None
-    reach = min(REACH, layout.quiet - blur.half_width_px / module_px(H))
-    return marker_pixels(grey, H, layout.modules, reach_modules=reach)
-
-
-def rounder(blur: Blur, further: Floats) -> Blur:
-    """A blur whose variance is larger by the first of ``further``, as far as it is believed."""
-    return replace(blur, variance_px2=_believed(blur.variance_px2 + float(further[0])))
-
-
-def _further(blur: Blur, further: Floats) -> Blur:
-    return _longer(blur, further) if further.size == 2 else rounder(blur, further)
-
-
-def _longer(blur: Blur, further: Floats) -> Blur:
-    """A moving blur with further variances: round, and along its path (path² / 12)."""
-    path2 = max(blur.path_px**2 + 12 * float(further[1]), 0.0)
-    scale = float(np.sqrt(path2)) / blur.path_px
-    x, y = blur.motion_px
-    return Blur(_believed(blur.variance_px2 + float(further[0])), (scale * x, scale * y))
-
-
-def _motion(blur: Blur, further: Floats) -> Blur:
-    """A motion along the longer axis of the blur, if it is clearly longer; xx, xy, yy added."""
-    path = np.array(blur.motion_px)
-    drawn = blur.variance_px2 * np.eye(2) + np.outer(path, path) / 12
-    V = drawn + further[[0, 1, 1, 2]].reshape(2, 2)
-    small, large = np.linalg.eigvalsh(V)
-    if large - small < ELONGATED_PX2:
-        return replace(blur, motion_px=(0.0, 0.0))
-    angle = 0.5 * np.arctan2(2 * V[0, 1], V[0, 0] - V[1, 1])
-    small = _believed(float(small))
-    length = float(np.sqrt(12 * (large - small))) if large > small else 0.0
-    return Blur(small, (length * float(np.cos(angle)), length * float(np.sin(angle))))
-
-
-def _believed(variance_px2: float) -> float:
-    return float(np.clip(variance_px2, *VARIANCES_PX2))
-
-
-def _noise(one: CardFit) -> float:
-    return one.fit.rms / one.fit.gain
+    card = layout.quiet - blur.edge_px / module_px(H)
+    return marker_pixels(
+        grey, H, layout.modules, reach_modules=min(REACH, card), path_px=blur.motion_px, card=card
+    )
 
 
 def _reach_px(H: Floats, layout: MarkerLayout) -> float:

@@ -220,14 +220,15 @@ class Follower:
         known, row, grey = self.known[marker], self._row[marker], scene.grey
         if not plausible(known.H, self._reader.library.layout, grey.shape):
             return None
-        start = known.H if marker in self._keys else self._searched(scene, known, row)
-        one = self._reader.fit(grey, start, (row, 0, 0), known.blur)
-        if one is None and not known.misses:
-            smeared = smeared_start(
+        pose = known.H if marker in self._keys else self._searched(scene, known, row)
+        one = self._reader.fit(grey, pose, (row, 0, 0), known.blur)
+        if not known.misses and (one is None or _smeared(one)):
+            start = smeared_start(
                 grey, self._reader.cards[row], known.H, self._reader.library.layout
             )
-            if smeared is not None:
-                one = self._reader.fit(grey, smeared[0], (row, 0, 0), smeared[1])
+            again = start and self._reader.fit(grey, start[0], (row, 0, 0), start[1])
+            if again and (one is None or again.card.noise < one.card.noise):
+                one = again
         if one is None:
             return None
         self._drop_key(marker)
@@ -246,6 +247,11 @@ class Follower:
         move[:2, 2] = place.moved_px
         out: Floats = move @ known.H
         return out
+
+
+def _smeared(one: Found) -> bool:
+    """Whether a fit left so much that a longer motion may be behind it."""
+    return one.card.noise > EVEN and not one.card.uneven
 
 
 def _after(one: Found) -> Known:

@@ -63,7 +63,7 @@ def make_key(
 
     noise (5, 5): autocorrelation of the pixels' noise. None where too little lies in the image.
     """
-    reach = min(REACH, layout.quiet - blur.half_width_px / module_px(H))
+    reach = min(REACH, layout.quiet - blur.edge_px / module_px(H))
     blank = np.broadcast_to(np.uint8(0), (size_px[1], size_px[0]))
     pixels = marker_pixels(blank, H, layout.modules, reach_modules=reach)
     if pixels is None:

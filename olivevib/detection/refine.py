@@ -85,10 +85,17 @@ class Pixels:
 
 
 def marker_pixels(
-    grey: Grey, H: Floats, modules: int, stride: int = 1, reach_modules: float = REACH
+    grey: Grey,
+    H: Floats,
+    modules: int,
+    stride: int = 1,
+    reach_modules: float = REACH,
+    path_px: tuple[float, float] = (0.0, 0.0),
+    card: float = np.inf,
 ) -> Pixels | None:
     """Every ``stride``-th pixel in each direction on the dark square and some modules around it.
 
+    Of these, whose motion path_px (2,) stays within ``card`` modules around the dark square.
     None where fewer than 40 pixels lie in the image.
     """
     reach = modules / 2 + reach_modules
@@ -104,7 +111,12 @@ def marker_pixels(
     u = G[0, 0] * x + (G[0, 1] * y + G[0, 2])[:, None]
     v = G[1, 0] * x + (G[1, 1] * y + G[1, 2])[:, None]
     limit = reach * np.abs(w)
-    rows, columns = np.nonzero((np.abs(u) <= limit) & (np.abs(v) <= limit))
+    on = (np.abs(u) <= limit) & (np.abs(v) <= limit)
+    for sign in (-0.5, 0.5) if any(path_px) else ():
+        du, dv, dw = sign * (G[:, 0] * path_px[0] + G[:, 1] * path_px[1])
+        limit = (modules / 2 + card) * np.abs(w + dw)
+        on &= (np.abs(u + du) <= limit) & (np.abs(v + dv) <= limit)
+    rows, columns = np.nonzero(on)
     third = (modules / 6) * w[rows, columns]
     cell = (u[rows, columns] > third).astype(np.intp) + (u[rows, columns] > -third)
     cell += 3 * ((v[rows, columns] > third).astype(np.intp) + (v[rows, columns] > -third))
@@ -127,13 +139,14 @@ class _State:
     """Unknowns in the passes: W (3, 3), light (o, ox, oy, g, gx, gy), blur (S,).
 
     spread (2, 2): covariance of the blur, px², in units of the pixels' scale: light falls on the
-    marker before it is blurred.
+    marker before it is blurred. path (2,): motion that is drawn, px; None where nothing moved.
     """
 
     W: Floats
     light: Floats
     further: Floats
     spread: Floats
+    path: Floats | None
 
 
 @dataclass(frozen=True)
@@ -220,7 +233,8 @@ def weights_in_place(template: Template, pixels: Pixels) -> Singles:
 def _settle(template: Template, pixels: Pixels) -> _Settled | None:
     """Gauss-Newton with Tukey weights from the second pass on."""
     spread = _covariance_px2(template.blur) / pixels.scale
-    state = _State(np.eye(3), np.zeros(6), np.zeros(template.texture.shape[2] - 3), spread)
+    path = np.array(template.blur.motion_px) if template.moving else None
+    state = _State(np.eye(3), np.zeros(6), np.zeros(template.texture.shape[2] - 3), spread, path)
     reads = _read(template, pixels, state.W)
     weight = np.ones_like(pixels.X)
     state.light = _light(pixels, reads[0], weight)
@@ -244,7 +258,7 @@ def _settle(template: Template, pixels: Pixels) -> _Settled | None:
             converged = True
             break
     J, residual = _linearised(pixels, reads, state)
-    return _Settled(state, J, _level(reads, state), residual, weight, converged)
+    return _Settled(state, J, _level(pixels, reads, state), residual, weight, converged)
 
 
 def _covariance_px2(blur: Blur) -> Floats:
@@ -281,10 +295,44 @@ def _light(pixels: Pixels, T: Singles, weight: Singles) -> Floats:
     return np.asarray(np.linalg.solve(A, (WJ @ pixels.level).astype(np.float64)))
 
 
-def _level(reads: Singles, state: _State) -> Singles:
-    """Template level (N,), 0 dark, 1 white, with the further blur."""
+def _level(pixels: Pixels, reads: Singles, state: _State) -> Singles:
+    """Template level (N,), 0 dark, 1 white, with the further blur.
+
+    A motion m is the same all over the image, hence in the template, which is drawn with one path,
+    it is W's own derivative at each pixel times m.
+    """
     out: Singles = reads[0] + state.further.astype(np.float32) @ reads[3:]
+    if state.path is not None:
+        x, y = (state.path + state.further[1:3]).astype(np.float32)
+        M = state.W.astype(np.float32)
+        w = 1 / (M[2, 0] * pixels.X + M[2, 1] * pixels.Y + M[2, 2])
+        u = (M[0, 0] * pixels.X + M[0, 1] * pixels.Y + M[0, 2]) * w
+        v = (M[1, 0] * pixels.X + M[1, 1] * pixels.Y + M[1, 2]) * w
+        back = M[2, 0] * x + M[2, 1] * y
+        out += ((M[0, 0] * x + M[0, 1] * y - back * u) * w - x) * reads[4]
+        out += ((M[1, 0] * x + M[1, 1] * y - back * v) * w - y) * reads[5]
     return out
+
+
+def _turned_path(pixels: Pixels, along: Singles, path: Floats) -> list[Singles]:
+    """Derivatives (N,) by W's eight entries, near 1, of a drawing whose path W turns as well.
+
+    along (2, N): its derivatives by the path's x and y.
+    """
+    X, Y = pixels.X, pixels.Y
+    x, y = path.astype(np.float32)
+    p, q = along
+    none, both, ahead = np.zeros_like(X), x * p + y * q, X * p + Y * q
+    return [
+        x * p,
+        y * p,
+        none,
+        x * q,
+        y * q,
+        none,
+        -(X * both + x * ahead),
+        -(Y * both + y * ahead),
+    ]
 
 
 def _image(pixels: Pixels, light: Floats, T: Singles) -> Singles:
@@ -316,7 +364,7 @@ def _linearised(pixels: Pixels, reads: Singles, state: _State) -> tuple[Singles,
     X, Y = pixels.X, pixels.Y
     _, _, _, g, gx, gy = state.light.astype(np.float32)
     gain = g + gx * X + gy * Y
-    T = _level(reads, state)
+    T = _level(pixels, reads, state)
     residual = pixels.level - _image(pixels, state.light, T) - _blurred_light(reads, state)
     M = state.W.astype(np.float32)
     w = 1 / (M[2, 0] * X + M[2, 1] * Y + M[2, 2])
@@ -326,6 +374,9 @@ def _linearised(pixels: Pixels, reads: Singles, state: _State) -> tuple[Singles,
     back *= -w
     one = np.ones_like(X)
     homography = [p * X, p * Y, p, q * X, q * Y, q, back * X, back * Y]
+    if state.path is not None:
+        turned = _turned_path(pixels, gain * reads[4:6], state.path + state.further[1:3])
+        homography = [a + b for a, b in zip(homography, turned, strict=True)]
     (a, b), (c, d) = state.spread.astype(np.float32)
     XT, YT = X * T + (a * reads[1] + c * reads[2]), Y * T + (b * reads[1] + d * reads[2])
     J = np.stack([*homography, one, X, Y, T, XT, YT, *(gain * reads[3:])])

@@ -44,19 +44,19 @@ class Blur:
         return float(np.hypot(*self.motion_px))
 
     @property
-    def half_width_px(self) -> float:
-        """How far an edge is smeared to either side, px: half the path and two sigma."""
-        return 0.5 * self.path_px + 2 * float(np.sqrt(self.variance_px2))
+    def edge_px(self) -> float:
+        """How far an edge is blurred to either side of where its path ends, px: two sigma."""
+        return 2 * float(np.sqrt(self.variance_px2))
 
 
 @dataclass(frozen=True)
 class Template:
     """Texture (h, w, 3 + S) float32: level (0 dark, 1 white), its derivatives by x and y per px,
-    and by S variances of further blur per px²: S = 1 round; 2 round and along the motion; 3 xx, xy
-    and yy.
+    and by S numbers of the blur: 1 a round variance, per px²; 3 with a motion: the same, and its
+    path's x and y, per px; or, for moments, variances xx, xy and yy.
 
     origin_px (2,): image point of texture sample (0, 0); H (3, 3): start pose, centred modules to
-    px; blur it is drawn with; samples a pixel.
+    px; blur it is drawn with; samples a pixel; moving: S is the one with a motion.
     """
 
     texture: NDArray[np.float32]
@@ -64,6 +64,7 @@ class Template:
     H: Floats
     blur: Blur
     samples: int
+    moving: bool = False
 
 
 def card(dark: Bools, quiet: int) -> NDArray[np.float32]:
@@ -114,31 +115,43 @@ def draw_template(
         sharp = cv2.remap(drawn, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     own = 1 / (6 * samples**2) + (side_px / fine) ** 2 / 12  # bilinear reads, drawn ramps
     sigma = samples * float(np.sqrt(max(blur.variance_px2 - own, 0.0)))
-    level = _smeared(np.asarray(sharp, dtype=np.float32), sigma, blur, samples)
+    still = _smoothed(np.asarray(sharp, dtype=np.float32), sigma)
+    level = _along(still, blur, samples)
     parts = [level, _slope(level, 1, 0, samples), _slope(level, 0, 1, samples)]
-    parts += _by_variances(level, blur, samples, moments)
+    parts += _by_variances(level, samples) if moments else _by_blur(level, still, blur, samples)
     texture = np.asarray(cv2.merge(parts), dtype=np.float32)
-    return Template(texture, origin, H, blur, samples)
+    moving = blur.path_px > LEAST_PATH_PX and not moments
+    return Template(texture, origin, H, blur, samples, moving)
 
 
-def _smeared(
-    level: NDArray[np.float32], sigma: float, blur: Blur, samples: int
-) -> NDArray[np.float32]:
-    out = level
-    if blur.path_px > LEAST_PATH_PX:
-        kernel = _path_kernel(samples * np.array(blur.motion_px))
-        path = cv2.filter2D(out, -1, kernel, borderType=cv2.BORDER_REPLICATE)
-        out = np.asarray(path, dtype=np.float32)
-    if sigma > LEAST_BLUR:
-        size = 2 * int(np.ceil(3 * sigma)) + 1
-        smooth = cv2.GaussianBlur(out, (size, size), sigma, borderType=cv2.BORDER_REPLICATE)
-        out = np.asarray(smooth, dtype=np.float32)
-    return out
+def _smoothed(level: NDArray[np.float32], sigma: float) -> NDArray[np.float32]:
+    if sigma <= LEAST_BLUR:
+        return level
+    size = 2 * int(np.ceil(3 * sigma)) + 1
+    smooth = cv2.GaussianBlur(level, (size, size), sigma, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(smooth, dtype=np.float32)
 
 
-def _path_kernel(path: Floats) -> NDArray[np.float32]:
-    """A straight path (2,), texture samples, as a filter kernel; bilinear along many points."""
-    half = int(np.ceil(np.abs(path).max() / 2)) + 1
+def _along(still: NDArray[np.float32], blur: Blur, samples: int) -> NDArray[np.float32]:
+    """The drawing as its motion smears it."""
+    if blur.path_px <= LEAST_PATH_PX:
+        return still
+    path = samples * np.array(blur.motion_px)
+    return _filtered(still, _path_kernel(path, _half(path)))
+
+
+def _half(path: Floats) -> int:
+    """Samples to either side that the kernels of a path, and of one slightly longer, need."""
+    return int(np.ceil(np.abs(path).max() / 2)) + 2
+
+
+def _filtered(level: NDArray[np.float32], kernel: NDArray[np.float32]) -> NDArray[np.float32]:
+    out = cv2.filter2D(level, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(out, dtype=np.float32)
+
+
+def _path_kernel(path: Floats, half: int) -> NDArray[np.float32]:
+    """A straight path (2,), texture samples, as a filter kernel (2 half + 1) squared; bilinear."""
     steps = (np.arange(PATH_POINTS) + 0.5) / PATH_POINTS - 0.5
     x, y = (half + path[axis] * steps for axis in (0, 1))
     i, j = np.floor(x).astype(int), np.floor(y).astype(int)
@@ -155,13 +168,27 @@ def _slope(level: NDArray[np.float32], dx: int, dy: int, samples: int) -> NDArra
     return np.asarray(slope, dtype=np.float32)
 
 
-def _by_variances(
-    level: NDArray[np.float32], blur: Blur, samples: int, moments: bool
+def _by_blur(
+    level: NDArray[np.float32], still: NDArray[np.float32], blur: Blur, samples: int
 ) -> list[NDArray[np.float32]]:
-    """Derivatives by further variances: ½ xx, xy, ½ yy; or round, and along the motion."""
-    if not moments and blur.path_px <= LEAST_PATH_PX:
-        round_ = cv2.Laplacian(level, cv2.CV_32F, ksize=1, scale=0.5 * samples**2)
-        return [np.asarray(round_, dtype=np.float32)]
+    """Derivatives by a round variance and, of what moves, by its path's x and y."""
+    round_ = cv2.Laplacian(level, cv2.CV_32F, ksize=1, scale=0.5 * samples**2)
+    out = [np.asarray(round_, dtype=np.float32)]
+    if blur.path_px > LEAST_PATH_PX:
+        path = samples * np.array(blur.motion_px)
+        out += [_filtered(still, samples * _path_slope(path, axis)) for axis in (0, 1)]
+    return out
+
+
+def _path_slope(path: Floats, axis: int) -> NDArray[np.float32]:
+    """Derivative of the path's kernel by its x (axis 0) or y, per texture sample."""
+    step = np.eye(2)[axis]
+    more, less = (_path_kernel(path + sign * step, _half(path)) for sign in (1, -1))
+    return np.asarray((more - less) / 2, dtype=np.float32)
+
+
+def _by_variances(level: NDArray[np.float32], samples: int) -> list[NDArray[np.float32]]:
+    """Derivatives by further variances: ½ xx, xy, ½ yy."""
     second = np.array([1.0, -2.0, 1.0]) * samples**2
     one = np.array([1.0])
     xx, yy = (
@@ -170,11 +197,7 @@ def _by_variances(
     )
     slope = np.array([-0.5, 0.0, 0.5]) * samples
     xy = np.asarray(cv2.sepFilter2D(level, cv2.CV_32F, slope, slope), dtype=np.float32)
-    if moments:
-        return [np.float32(0.5) * xx, xy, np.float32(0.5) * yy]
-    c, s = np.array(blur.motion_px) / blur.path_px
-    along = (c * c * xx + 2 * c * s * xy + s * s * yy) / 2
-    return [np.float32(0.5) * (xx + yy), np.asarray(along, dtype=np.float32)]
+    return [np.float32(0.5) * xx, xy, np.float32(0.5) * yy]
 
 
 def module_px(H: Floats) -> float:
