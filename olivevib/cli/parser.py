@@ -88,6 +88,7 @@ def _prepare_verbs(verbs: Any) -> None:
     new.add_argument("--ids", metavar="1,2,5-9", help="the markers on the tree (default: all)")
     new.add_argument("--shutter", choices=("rolling", "global"), help="how the sensors read out")
     new.add_argument("--row-time", metavar="US[,US]", help="microseconds per sensor row, signed")
+    new.add_argument("--exposure", type=float, metavar="MS", help="exposure time of both cameras")
     new.add_argument("--band", metavar="5-45", help="where the shaker's frequency may lie, Hz")
     new.add_argument("--left-stamps", metavar="FILE", help="time stamps, one a frame")
     new.add_argument("--right-stamps", metavar="FILE", help="time stamps, one a frame")

@@ -14,7 +14,6 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
-from itertools import pairwise
 from typing import Any
 
 import matplotlib as mpl
@@ -24,10 +23,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
-from matplotlib.ticker import NullLocator
 
-from olivevib.arrays import Bools, Floats
+from olivevib.arrays import Bools, Floats, Ints
 from olivevib.report.clean import clean
+from olivevib.report.figures.panel import Panel
 
 WIDTH_IN = 8.6  # every figure has the width of the page
 TICK_LEFT, TICK_DOWN = 0, 3  # matplotlib's markers
@@ -174,8 +173,13 @@ def rows_and_columns(
     *,
     margins_in: Sequence[float],
     gaps_in: Sequence[float],
+    light: bool = False,
 ) -> list[list[Axes]]:
-    """A grid of axes with margins (left, right, top, bottom) and gaps (across, down) in inches."""
+    """A grid of axes with margins (left, right, top, bottom) and gaps (across, down) in inches.
+
+    light: the axes have no ticks until ``light_ticks`` draws them.
+    """
+    kind = Panel if light else Axes
     width, height = figure.get_size_inches()
     left, right, top, bottom = margins_in
     across, down = gaps_in
@@ -184,11 +188,11 @@ def rows_and_columns(
     grid: list[list[Axes]] = []
     for r in range(rows):
         y = height - top - h * (r + 1) - down * r
-        row = [
-            figure.add_axes(((left + (w + across) * c) / width, y / height, w / width, h / height))
+        boxes = (
+            ((left + (w + across) * c) / width, y / height, w / width, h / height)
             for c in range(columns)
-        ]
-        grid.append(row)
+        )
+        grid.append([figure.add_axes(kind(figure, box)) for box in boxes])
     return grid
 
 
@@ -220,16 +224,12 @@ def key(
 def light_ticks(
     ax: Axes, x: Sequence[float], y: Sequence[float], *, left: bool, bottom: bool
 ) -> None:
-    """Ticks, their numbers and the grid of a panel as three artists; its limits must stand.
+    """Ticks, their numbers and the grid of a light panel; its limits must stand.
 
-    matplotlib builds five artists a tick, which is most of the time that a grid of panels takes.
     Numbers stand only at the left and at the bottom where asked for.
     """
     at_x = np.array([v for v in x if min(ax.get_xlim()) <= v <= max(ax.get_xlim())])
     at_y = np.array([v for v in y if min(ax.get_ylim()) <= v <= max(ax.get_ylim())])
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(NullLocator())
-        axis.set_minor_locator(NullLocator())
     across, up = ax.get_yaxis_transform(), ax.get_xaxis_transform()
     ax.hlines(at_y, 0, 1, transform=across, color=GRID, lw=0.5, zorder=0.5)
     how: dict[str, Any] = {"ls": "", "color": QUIET, "ms": 2.5, "mew": 0.6, "clip_on": False}
@@ -304,14 +304,18 @@ def thin(t: Floats, values: Floats, most: int = 900) -> tuple[Floats, Floats]:
     if n <= most:
         return t, values
     edges = np.linspace(0, n, most // 2 + 1).astype(int)
-    at: list[int] = []
-    for first, last in pairwise(edges):
-        part = values[first:last]
-        if np.isnan(part).all():
-            at += [first, last - 1]
-        else:
-            at += sorted((first + int(np.nanargmin(part)), first + int(np.nanargmax(part))))
+    part = np.repeat(np.arange(edges.size - 1), np.diff(edges))
+    lowest = _first_of_each(np.lexsort((np.nan_to_num(values, nan=np.inf), part)), edges)
+    highest = _first_of_each(np.lexsort((np.nan_to_num(-values, nan=np.inf), part)), edges)
+    empty = np.isnan(values[lowest])
+    lowest, highest = np.where(empty, edges[:-1], lowest), np.where(empty, edges[1:] - 1, highest)
+    at = np.sort(np.stack([lowest, highest], axis=1), axis=1).ravel()
     return t[at], values[at]
+
+
+def _first_of_each(order: Ints, edges: Ints) -> Ints:
+    """Of indices sorted by stretch, then by value, the first of each stretch."""
+    return np.asarray(order[edges[:-1]])
 
 
 def stride(n: int, most: int) -> int:

@@ -80,7 +80,7 @@ def time_series(
 
     def paint(figure: Figure) -> None:
         grid = canvas.rows_and_columns(
-            figure, len(ids), 3, margins_in=(0.5, 0.12, 0.38, 0.4), gaps_in=(0.16, 0.24)
+            figure, len(ids), 3, margins_in=(0.5, 0.12, 0.38, 0.4), gaps_in=(0.16, 0.24), light=True
         )
         for row, marker_id in zip(grid, ids, strict=True):
             t_s, xyz = displacement_mm(trajectory, marker_id)

@@ -42,7 +42,7 @@ def orbits(
     def paint(figure: Figure) -> None:
         right = 0.08 + (across - len(ids)) * (side + 0.1)
         grid = canvas.rows_and_columns(
-            figure, 3, len(ids), margins_in=(0.62, right, 0.4, 0.4), gaps_in=(0.1, 0.1)
+            figure, 3, len(ids), margins_in=(0.62, right, 0.4, 0.4), gaps_in=(0.1, 0.1), light=True
         )
         for c, marker_id in enumerate(ids):
             _, xyz = displacement_mm(trajectory, marker_id)

@@ -48,7 +48,7 @@ def amplitude_spectra(
 
     def paint(figure: Figure) -> None:
         grid = canvas.rows_and_columns(
-            figure, len(ids), 3, margins_in=(0.6, 0.15, 0.4, 0.4), gaps_in=(0.2, 0.26)
+            figure, len(ids), 3, margins_in=(0.6, 0.15, 0.4, 0.4), gaps_in=(0.2, 0.26), light=True
         )
         limits = _limits(spectrum.amplitude[1:, np.isin(spectrum.ids, ids)])
         for r, (row, marker_id) in enumerate(zip(grid, ids, strict=True)):
@@ -103,7 +103,12 @@ def _totals(
 
     def paint(figure: Figure) -> None:
         grid = canvas.rows_and_columns(
-            figure, rows, columns, margins_in=(0.6, 0.15, 0.36, 0.4), gaps_in=(0.2, 0.28)
+            figure,
+            rows,
+            columns,
+            margins_in=(0.6, 0.15, 0.36, 0.4),
+            gaps_in=(0.2, 0.28),
+            light=True,
         )
         limits = _limits(total[1:, np.isin(spectrum.ids, ids)])
         panels = [ax for row in grid for ax in row]
