@@ -40,6 +40,7 @@ def new(arguments: argparse.Namespace, console: Console) -> int:
         ids=values.id_list(arguments.ids),
         shutter=arguments.shutter,
         row_time_us=(left_row, right_row),
+        exposure_ms=arguments.exposure,
         band_hz=values.band(arguments.band),
         left_stamps=arguments.left_stamps,
         right_stamps=arguments.right_stamps,
@@ -52,6 +53,8 @@ def new(arguments: argparse.Namespace, console: Console) -> int:
     trial = pipeline.new_trial(folder, plan, console.tick)
     changes = values.settings(arguments.set)
     trial = trial.changed(changes) if changes else trial
+    for words in pipeline.unsaid(plan):
+        console.say(f"  not said: {words}")
     console.say(f"made {trial.folder}; describe it in {trial.folder / 'trial.toml'}")
     console.say(f"Next: olivevib run {arguments.trial}")
     return 0

@@ -5,11 +5,13 @@ from olivevib.pipeline.check import Finding, check
 from olivevib.pipeline.compare import compare, keep_preset
 from olivevib.pipeline.measure import analyse, reconstruct
 from olivevib.pipeline.new import NewTrial, new_trial
+from olivevib.pipeline.new_checks import Fault, faults, unsaid
 from olivevib.pipeline.outputs import export, export_place, report
 from olivevib.pipeline.run import Outcome, run, run_stage
 from olivevib.pipeline.track import track
 
 __all__ = [
+    "Fault",
     "Finding",
     "NewTrial",
     "Outcome",
@@ -19,6 +21,7 @@ __all__ = [
     "compare",
     "export",
     "export_place",
+    "faults",
     "keep_preset",
     "new_trial",
     "reconstruct",
@@ -26,4 +29,5 @@ __all__ = [
     "run",
     "run_stage",
     "track",
+    "unsaid",
 ]

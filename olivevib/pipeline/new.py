@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import tomlkit
 from tomlkit.items import Table
 
-from olivevib.calibration.boards import parse_board
-from olivevib.errors import InputError, OlivevibError, UsageError
-from olivevib.files.accelerometer import NoAccelerationError, read_accelerometer, read_preset
+from olivevib.errors import UsageError
 from olivevib.files.atomic import as_input_error
 from olivevib.files.capture import sidecar_of
 from olivevib.files.stamps import pick_camera
 from olivevib.files.stills import IMAGE_SUFFIXES
 from olivevib.files.trial_folders import FILE
-from olivevib.files.video import Video
-from olivevib.marker import load_library
-from olivevib.pipeline.libraries import only_known
-from olivevib.pipeline.recordings import SIDES, check_sizes
+from olivevib.pipeline.new_checks import check_plan
+from olivevib.pipeline.recordings import SIDES
 from olivevib.progress import Tick, silent
 from olivevib.trial import Trial
 
@@ -62,7 +58,7 @@ def new_trial(folder: Path, plan: NewTrial, tick: Tick = silent) -> Trial:
 
     Raises InputError or UsageError before anything is written; the folder appears whole or not.
     """
-    _check(plan)
+    check_plan(plan)
     part = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(part, ignore_errors=True)
     try:
@@ -92,87 +88,6 @@ def _merge_into(part: Path, folder: Path) -> None:
         )
     for path in names:
         path.rename(folder / path.name)
-
-
-def _check(plan: NewTrial) -> None:
-    """Every fault of the plan that can be told before the work starts."""
-    pair = (plan.calibration_left, plan.calibration_right)
-    if any(pair) and not all(pair):
-        raise UsageError(
-            "only one side of the calibration was given.",
-            "",
-            "Give both --calibration-left and --calibration-right, or --rig FILE.",
-        )
-    if all(pair) and plan.rig:
-        raise UsageError(
-            "both board recordings and a rig were given.", "", "Give one of them, not both."
-        )
-    if all(pair) and not plan.board:
-        raise UsageError(
-            "the calibration board is not known.",
-            "",
-            "Name it with --board SPEC; olivevib new --help lists them.",
-        )
-    if plan.board:
-        parse_board(plan.board)
-    if plan.size_mm is not None and not plan.size_mm > 0:
-        raise UsageError(f"--size {plan.size_mm} is no size.", "", "Give millimetres above 0.")
-    only_known(load_library(plan.markers), plan.ids)
-    if Path(plan.left).resolve() == Path(plan.right).resolve():
-        raise UsageError(
-            f"left and right are the same file, {plan.left}.",
-            "Positions in space need the pictures of two cameras.",
-            "Give the recording of each camera.",
-        )
-    for path in _named(plan):
-        if not path.exists():
-            raise InputError(f"{path} is missing.", "", "Check the name and the folder.")
-    sizes = {side: _size(Path(getattr(plan, side))) for side in SIDES}
-    check_sizes(sizes)
-    for side in SIDES:
-        _check_calibration_size(plan, side, sizes[side])
-        stamps = getattr(plan, f"{side}_stamps")
-        if stamps:
-            pick_camera(stamps, Path(getattr(plan, side)).name)
-    if plan.accelerometer:
-        _check_accelerometer(Path(plan.accelerometer), plan.preset)
-
-
-def _check_accelerometer(path: Path, preset: str | None) -> None:
-    """InputError where the file holds no acceleration; what options may mend waits for compare."""
-    options = read_preset(Path(preset)) if preset else None
-    try:
-        read_accelerometer(path, options)
-    except NoAccelerationError:
-        raise
-    except OlivevibError:
-        return
-
-
-def _named(plan: NewTrial) -> Iterator[Path]:
-    names = [plan.left, plan.right, plan.calibration_left, plan.calibration_right]
-    names += [plan.rig, plan.accelerometer, plan.preset]
-    yield from (Path(name) for name in names if name)
-
-
-def _size(video: Path) -> tuple[int, int]:
-    with Video.open(video) as opened:
-        return opened.info.size_px
-
-
-def _check_calibration_size(plan: NewTrial, side: str, size: tuple[int, int]) -> None:
-    """InputError where a calibration video has another size than the trial's of that camera."""
-    calibration = getattr(plan, f"calibration_{side}")
-    if not calibration or not Path(calibration).is_file():
-        return
-    other = _size(Path(calibration))
-    if other != size:
-        raise InputError(
-            f"the {side} calibration is {other[0]} x {other[1]} px, "
-            f"the trial {size[0]} x {size[1]} px.",
-            "A calibration holds for one mode of the camera only.",
-            "Record the board in the same mode as the trial, neither cropped, turned nor scaled.",
-        )
 
 
 @dataclass(frozen=True)
