@@ -260,6 +260,8 @@ def strongest(found: Scan, allowed: Bools, false_alarm: float) -> float | None:
     strong = np.flatnonzero(allowed & (evidence > found.total.size))
     order = strong[np.argsort(found.power[strong])[::-1]]
     for k in order[:200]:
+        if found.false_alarm(float(evidence[k]), width) >= false_alarm:
+            continue  # noise explains it even before its surroundings are looked at
         worth = evidence[k] / _above_white(evidence, int(k), found.total.size)
         if found.false_alarm(float(worth), width) < false_alarm:
             return _summit(found, int(k))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft
 
 from olivevib.arrays import Floats, floats
@@ -150,11 +151,12 @@ def sensor_ridge(
     inside = (f >= band_hz[0]) & (f <= band_hz[1])
     hann = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
     scale = 2.0 / (n * np.sum(hann**2))
+    windows = sliding_window_view(np.ascontiguousarray(values.T), n, axis=1)[:, ::hop]  # (C, K, n)
     rows = []
-    for chunk in np.array_split(starts, max(1, starts.size // _CHUNK)):
-        frames = values[chunk[:, None] + np.arange(n)]
-        frames = (frames - frames.mean(axis=1, keepdims=True)) * hann[:, None]
-        power = np.sum(np.abs(fft.rfft(frames, axis=1)) ** 2, axis=2)
+    for first in range(0, starts.size, _CHUNK):
+        frames = windows[:, first : first + _CHUNK]
+        waves = fft.rfft((frames - frames.mean(axis=2, keepdims=True)) * hann, axis=2)
+        power = np.sum(waves.real**2 + waves.imag**2, axis=0)
         rows.append(_peaks(power, f, inside, scale))
     columns = np.concatenate(rows) if rows else np.empty((0, 3))
     middle = t_s[0] + (starts + n / 2) / rate

@@ -69,10 +69,11 @@ def analyse_sensor(
     ends = Phase(WHOLE, float(t_s[0]), float(t_s[-1]))
     phase = next((p for p in phases if p.name == "steady"), ends)
     part = between(samples, phase.start_s, phase.end_s)
-    clock = clock_of(measured(part)[0])
+    of_part = measured(part)
+    clock = clock_of(of_part[0])
     found = fit_line(part, SamplingFacts(clock.rate_hz, stamps_true=True, band_hz=band_hz), _LINE)
     grid, shape = grid_of(clock), window(shown)
-    amplitude, psd = spectra(*measured(part), grid, shape)
+    amplitude, psd = spectra(*of_part, grid, shape)
     top_hz = min(clock.rate_hz / 2, _CYCLE * band_hz[1])
     speed, path = _integrals(t_s, a, phase, band_hz[0] / 2, top_hz)
     noise = np.full(3, np.nan) if found.fit is None else found.fit.noise
@@ -84,9 +85,7 @@ def analyse_sensor(
         f_hz=grid.f_hz,
         amplitude=amplitude,
         psd=psd,
-        acceleration=figures(
-            measured(part)[1], "acceleration", "m/s2", phase.duration_s, noise, line[0]
-        ),
+        acceleration=figures(of_part[1], "acceleration", "m/s2", phase.duration_s, noise, line[0]),
         velocity=_figures("velocity", speed, phase, line[1]),
         displacement=_figures("displacement", path, phase, line[2]),
         top_hz=top_hz,
@@ -121,14 +120,14 @@ def _integrals(
 ) -> tuple[Floats | None, Floats | None]:
     """Velocity (mm/s) and displacement (mm) in a phase, from one transform of the whole record.
 
-    Omega arithmetic as kinematics.to_displacement; the inverse on the coarsest grid that holds
-    frequencies up to top_hz.
+    Omega arithmetic as kinematics.to_displacement, padded by what the filter rings; the inverse on
+    the coarsest grid that holds frequencies up to top_hz.
     """
     clock: Clock = clock_of(t_s)
     if not clock.even or clock.span_s * corner_hz < 4 * _ENDS:
         return None, None
     n, rate = t_s.size, clock.rate_hz
-    padded = fft.next_fast_len(2 * n, real=True)
+    padded = fft.next_fast_len(n + int(np.ceil(2 * _ENDS / corner_hz * rate)), real=True)
     step = rate / padded
     coarse = fft.next_fast_len(min(padded, int(2 * top_hz / step) + 2), real=True)
     kept = min(coarse // 2 + 1, padded // 2 + 1)

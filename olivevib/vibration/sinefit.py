@@ -166,15 +166,15 @@ class _Problem:
         return float(self.since_s[-1] - self.since_s[0])
 
     def waves(self, f: Floats) -> tuple[Floats, Floats]:
-        first = 2 * np.pi * np.outer(self.since_s, f)
+        first = np.multiply.outer(2 * np.pi * f, self.since_s)
         cos, sin = np.cos(first), np.sin(first)
-        columns = np.empty((2, self.since_s.size, len(self.tones.group)))
+        columns = np.empty((2, len(self.tones.group), self.since_s.size))
         for j, (k, m) in enumerate(zip(self.tones.group, self.tones.multiples, strict=True)):
-            c, s = cos[:, k], sin[:, k]
+            c, s = cos[k], sin[k]
             for _ in range(m - 1):
-                c, s = c * cos[:, k] - s * sin[:, k], s * cos[:, k] + c * sin[:, k]
-            columns[:, :, j] = c, s
-        return columns[0], columns[1]
+                c, s = c * cos[k] - s * sin[k], s * cos[k] + c * sin[k]
+            columns[:, j] = c, s
+        return columns[0].T, columns[1].T
 
     def solve(self, f: Floats) -> _State:
         cos, sin = self.waves(f)
@@ -192,11 +192,13 @@ class _Problem:
     def slopes(self, state: _State) -> Floats:
         """(K, N, C): derivative of the waves to each free frequency, per Hz."""
         a, b = self.parts(state)
-        out = np.zeros((self.tones.count, *self.values.shape))
-        for j, (k, m) in enumerate(zip(self.tones.group, self.tones.multiples, strict=True)):
-            wave = np.outer(state.cos[:, j], b[j]) - np.outer(state.sin[:, j], a[j])
-            out[k] += (2 * np.pi * m * self.since_s)[:, None] * wave
-        return np.stack([self.project(slope) for slope in out])
+        turn = 2 * np.pi * np.array(self.tones.multiples, dtype=np.float64)[:, None]
+        out = []
+        for k in range(self.tones.count):
+            of = np.array(self.tones.group) == k
+            wave = state.cos[:, of] @ (turn * b)[of] - state.sin[:, of] @ (turn * a)[of]
+            out.append(self.project(self.since_s[:, None] * wave))
+        return np.stack(out)
 
     def information(self, state: _State) -> tuple[Floats, Floats]:
         """(K, K) information on the frequencies, and (K,) what the residual asks of them."""

@@ -58,13 +58,14 @@ def spectra(t_s: Floats, values: Floats, grid: Grid, window: Window) -> tuple[Fl
     powers: list[Floats] = []
     densities: list[Floats] = []
     while start + span <= t_s[-1] + 0.6 / grid.rate_hz or not powers:
-        inside = (t_s >= start) & (t_s < start + span)
-        if inside.sum() > 3:
+        inside = slice(*(int(k) for k in np.searchsorted(t_s, [start, start + span])))
+        count = inside.stop - inside.start
+        if count > 3:
             amplitude, density = _one(t_s[inside], values[inside], start, grid, window)
             powers.append(amplitude**2)
             densities.append(density)
         elif not powers:
-            raise ValueError(f"a spectrum needs more than three samples, got {int(inside.sum())}")
+            raise ValueError(f"a spectrum needs more than three samples, got {count}")
         start += span / 2
     density = np.mean(densities, axis=0)
     return np.sqrt(np.mean(powers, axis=0)), _to_variance(density, values, grid)
@@ -89,14 +90,13 @@ def _one(
 def _even(centred: Floats, grid: Grid, window: Window) -> tuple[Floats, Floats]:
     n = grid.places
     w = window.at(np.arange(n) / n)
-    transform = np.abs(fft.rfft(centred * w[:, None], axis=0))
+    transform = fft.rfft(centred * w[:, None], axis=0)
     sides = np.full((transform.shape[0], 1), 2.0)
     sides[0] = 1.0
     if n % 2 == 0:
         sides[-1] = 1.0
-    amplitude = sides * transform / w.sum()
-    density = sides * transform**2 / (grid.rate_hz * np.sum(w * w))
-    return amplitude, density
+    power = transform.real**2 + transform.imag**2
+    return sides / w.sum() * np.sqrt(power), sides / (grid.rate_hz * np.sum(w * w)) * power
 
 
 def _uneven(since_s: Floats, centred: Floats, grid: Grid, window: Window) -> tuple[Floats, Floats]:
