@@ -371,7 +371,7 @@ async def test_a_new_trial_is_made_from_two_recordings_by_keys(workspace, tmp_pa
     raw = tmp_path / "raw"
     raw.mkdir()
     for side in ("left", "right"):
-        make_video(raw / f"{side}.avi", frames=5)
+        make_video(raw / f"{side}.avi", frames=5, size=(640, 480))
     shutil.copy(workspace / "trials/2026-11-21_T06/shared_rig.toml", raw / "rig.toml")
     async with started(workspace) as (app, pilot):
         await press(pilot, "n")
@@ -380,7 +380,7 @@ async def test_a_new_trial_is_made_from_two_recordings_by_keys(workspace, tmp_pa
         app.screen.query_one("#left", Input).value = str(raw / "left.avi")
         await press(pilot, "enter")
         assert app.screen.query_one("#right", Input).value == str(raw / "right.avi")
-        assert "left, 128 × 96 px" in str(app.screen.query_one("#left-first").border_title)
+        assert "left, 640 × 480 px" in str(app.screen.query_one("#left-first").border_title)
         app.screen.query_one("#rig", Input).value = str(raw / "rig.toml")
         app.screen.query_one("#band", Input).value = "5-14"
         await press(pilot, "ctrl+s")
@@ -394,7 +394,7 @@ async def test_a_new_trial_takes_over_the_settings_of_the_marked_one(workspace):
     async with started(workspace) as (app, pilot):
         await press(pilot, "N")
         form = {f: app.screen.query_one(f"#{f}", Input).value for f in ("size", "ids", "shutter")}
-        assert form == {"size": "60.0", "ids": "1,2,5,9", "shutter": "global"}
+        assert form == {"size": "60", "ids": "1,2,5,9", "shutter": "global"}
         assert app.screen.query_one("#rig", Input).value.endswith("2026-11-20_T04/rig.toml")
         assert app.screen.query_one("#left", Input).value == ""
 
@@ -420,19 +420,61 @@ async def test_a_new_trial_that_cannot_be_made_says_why_and_keeps_the_form(works
         assert not (workspace / "trials/T07").exists()
 
 
-async def test_a_file_is_picked_from_the_tree(workspace, tmp_path):
-    make_video(tmp_path / "left.avi", frames=3)
+async def test_a_file_is_picked_by_typing_part_of_its_name(workspace, tmp_path):
+    (tmp_path / "raw").mkdir()
+    for name in ("left.avi", "right.avi"):
+        make_video(tmp_path / "raw" / name, frames=3)
     async with started(workspace) as (app, pilot):
-        await press(pilot, "n", "tab", "ctrl+o")
-        await pilot.press("backspace")
-        tree = app.screen.query_one("#tree")
-        await settle(pilot)
-        while not tree.root.children:
-            await pilot.pause(0.02)
-        await pilot.press("down", "down", "enter")
-        await settle(pilot)
-        assert app.screen.query_one("#left", Input).value == str(tmp_path / "left.avi")
+        await press(
+            pilot, "n", "tab", "ctrl+o", "backspace", "text:raw", "enter", "text:le", "enter"
+        )
+        assert app.screen.query_one("#left", Input).value == str(tmp_path / "raw" / "left.avi")
+        assert app.screen.query_one("#right", Input).value == str(tmp_path / "raw" / "right.avi")
         assert app.screen.query_one("#left-first", Picture)._shown is not None
+        await press(pilot, "escape", "n", "tab", "ctrl+o")  # begins where it was left
+        assert "left.avi" in screen_text(app)
+        await press(pilot, "text:nothing")
+        assert "nothing here by that name" in screen_text(app)
+        await press(pilot, "escape", "tab", "tab", "ctrl+o", "ctrl+t")
+        assert app.screen.query_one("#calibration_left", Input).value == str(tmp_path / "raw")
+
+
+async def test_a_second_trial_begins_as_the_last_one(workspace):
+    folder = workspace / "trials/2026-11-20_T05"
+    said = {"cameras.left.exposure_ms": 2.5, "markers.size_mm": 72.5, "session.operator": "Ana"}
+    Trial.open(folder).changed(said)
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "n")
+        names = ("size", "exposure", "operator", "place", "cultivar", "rig", "left")
+        form = [app.screen.query_one(f"#{name}", Input).value for name in names]
+        assert form == ["72.5", "2.5", "Ana", "Bari, plot 7", "Coratina", "", ""]
+        assert "as in 2026-11-20_T05" in screen_text(app)
+
+
+async def test_the_form_says_in_its_own_words_what_is_wrong(workspace, tmp_path):
+    for side in ("left", "right"):
+        make_video(tmp_path / f"{side}.avi", frames=3)
+    (tmp_path / "broken.avi").write_bytes(b"no video")
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "n", "tab", f"text:{tmp_path / 'broken.avi'}", "enter")
+        assert "“left recording”" in words(app, "#told")
+        assert "is not a video" in words(app, "#told")
+        app.screen.query_one("#left", Input).value = str(tmp_path / "left.avi")
+        app.screen.query_one("#right", Input).value = str(tmp_path / "right.avi")
+        for name, text in (("size", "wide"), ("ids", "1-400"), ("band", "9"), ("board", "x:1")):
+            line = app.screen.query_one(f"#{name}", Input)
+            was, line.value = line.value, text
+            await press(pilot, "ctrl+s")
+            assert isinstance(app.screen, ErrorScreen)
+            told = words(app, ".dialog > Static")
+            assert f"“{line.parent.query_one('Label').content}”" in told
+            assert "--" not in told
+            await press(pilot, "escape")
+            assert app.focused is line
+            line.value = was
+        await press(pilot, "enter")
+        assert "Not said yet" in words(app, "#told")
+        assert "--" not in words(app, "#told")
 
 
 # -- everywhere -----------------------------------------------------------------------------------

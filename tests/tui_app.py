@@ -15,7 +15,7 @@ from textual.worker import WorkerCancelled, WorkerFailed
 
 from olivevib.tui.app import OlivevibApp
 
-OURS = {"read", "work", "frame", "first", "save", "kept"}
+OURS = {"read", "look", "work", "frame", "first", "save", "kept"}
 
 
 async def settle(pilot: Pilot[None]) -> None:

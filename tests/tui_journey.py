@@ -13,7 +13,8 @@ WAIT = "wait"  # until no work runs any more
 KEYS = (
     *("n", "enter", "text:raw/left.nut", *["enter"] * 4),
     *("ctrl+o", "down", "enter", "enter", "enter", "text:67.8", "enter", "text:1-6", "enter"),
-    *("text:aruco:DICT_4X4_50", "enter", "text:global", "enter", "enter", "text:5-14", "enter"),
+    *("text:aruco:DICT_4X4_50", "enter", "text:global", "enter", "enter", "text:2", "enter"),
+    *("text:5-14", "enter"),
     *("enter", "text:2", "ctrl+s", WAIT, "r", WAIT),
     *("v", "escape", "c", "escape", "e", "e", WAIT, *["down"] * 4, "enter", WAIT),
 )

@@ -23,6 +23,7 @@ class Kept:
     marker: int = -1
     plane: int = 0
     axis: str = "all"
+    folder: str = ""  # where a file was last picked
 
     def with_(self, **changes: Any) -> Kept:
         """The same with some values changed."""

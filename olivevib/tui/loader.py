@@ -81,6 +81,7 @@ class FormValues:
 
     shared: Mapping[str, str]
     used: Mapping[str, tuple[str, ...]]
+    source: str = ""  # the trial that ``shared`` is of
 
 
 @dataclass(frozen=True)
@@ -258,21 +259,31 @@ def shades(found: Results, marker: int, name: str) -> ShadePlot | None:
 
 
 def form_values(workspace: Path, like: Path | None) -> FormValues:
-    """What a new trial may take over from ``like``, and what trials here have said before."""
+    """What a new trial may take over from ``like``, and what trials here have said before.
+
+    like None: from the trial that was made last, but not its calibration, because the cameras may
+    have been moved since.
+    """
     from olivevib.trial import Trial
     from olivevib.tui.plan import values_of
 
+    opened = {f: guarded(partial(Trial.open, f)) for f in trial_folders(workspace)[-LAST:]}
+    trials = {f: trial for f, trial in opened.items() if isinstance(trial, Trial)}
+    source = like or max(trials, key=_made_ns, default=None)
     used: dict[str, dict[str, None]] = {}
-    for folder in trial_folders(workspace)[-LAST:]:
-        trial = guarded(partial(Trial.open, folder))
-        if isinstance(trial, Trial):
-            for name, text in values_of(trial.settings, trial.path).items():
-                used.setdefault(name, {})[text] = None
-    shared = {}
-    if like is not None:
-        trial = Trial.open(like)
-        shared = values_of(trial.settings, trial.path)
-    return FormValues(shared, {name: tuple(texts) for name, texts in used.items()})
+    shared: Mapping[str, str] = {}
+    for folder, trial in trials.items():
+        values = values_of(trial.settings, trial.path, folder == like)
+        shared = values if folder == source else shared
+        for name, text in values.items():
+            used.setdefault(name, {})[text] = None
+    offered = {name: tuple(texts) for name, texts in used.items()}
+    return FormValues(shared, offered, source.name if source and shared else "")
+
+
+def _made_ns(folder: Path) -> int:
+    """When trial.toml was last written."""
+    return (folder / "trial.toml").stat().st_mtime_ns
 
 
 def settings_now(folder: Path) -> DetectionSettings:

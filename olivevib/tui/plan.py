@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from olivevib.errors import UsageError
 
 if TYPE_CHECKING:
     from olivevib.pipeline import NewTrial
     from olivevib.trial import TrialSettings
+
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ BOARDS = (
 LIBRARIES = ("olive49", "aruco:DICT_4X4_50", "apriltag:36h11")
 SIZES = ("40", "50", "60", "80", "100")
 IDS = ("1-6", "1-8", "1-12", "1-24")
+EXPOSURES = ("1", "2", "5", "10")
 BANDS = ("5-14", "5-25", "5-45", "15-40")
 
 FIELDS = (
@@ -53,9 +56,11 @@ FIELDS = (
     Field("markers", "marker library", "olive49, aruco:…, a TOML file", choices=LIBRARIES),
     Field("shutter", "shutter", "rolling or global; empty: unknown", choices=("rolling", "global")),
     Field("row_time", "row time, µs", "27.8 or 27.8,-27.8; empty: unknown"),
+    Field("exposure", "exposure, ms", "2; empty: unknown, blur stays", choices=EXPOSURES),
     Field("band", "band, Hz", "where the shaker's frequency may lie: 5-45", choices=BANDS),
     Field("accelerometer", "accelerometer", "what the logger wrote", True),
     Field("accelerometer_marker", "its marker", "the id it was fixed to"),
+    Field("preset", "its preset", "how its file is read: kept from another trial", True),
     Field("left_stamps", "left stamps", "time stamps, where they are in a file", True),
     Field("right_stamps", "right stamps", "time stamps, where they are in a file", True),
     Field("link", "link", "yes: leave the recordings in place; empty: copy", choices=("yes",)),
@@ -76,38 +81,59 @@ RECORD = {
     "machine": "machine.make",
     "notes": "session.notes",
 }
+SHARED = ("place", "operator", "cultivar", "machine")  # of the record: as on the trial before
+FORM_NAMES = {"size_mm": "size", "row_time_us": "row_time", "band_hz": "band"} | {
+    "exposure_ms": "exposure"
+}  # what the plan calls a line of the form
 PATHS = tuple(field.name for field in FIELDS if field.path)
 
 
+class FieldError(UsageError):
+    """A line of a form that cannot be read; ``field`` is its name."""
+
+    def __init__(self, field: str, what: str, remedy: str) -> None:
+        super().__init__(what, "", remedy)
+        self.field = field
+
+
 def plan_of(values: Mapping[str, str]) -> NewTrial:
-    """The plan that the form describes; UsageError names the field that cannot be read."""
+    """The plan that the form describes, as far as it is filled in.
+
+    FieldError names the first line that cannot be read.
+    """
     from olivevib import values as typed
     from olivevib.pipeline import NewTrial
 
     said = {name: text.strip() for name, text in values.items() if text.strip()}
-    for name in ("left", "right"):
-        if name not in said:
-            raise UsageError(f"the {name} recording is not named.", "", "Pick it with Ctrl+O.")
-    left_row, right_row = typed.row_times(said.get("row_time"))
+    left_row, right_row = _read(said, "row_time", typed.row_times) or (None, None)
     return NewTrial(
-        left=said["left"],
-        right=said["right"],
+        left=said.get("left", ""),
+        right=said.get("right", ""),
         calibration_left=said.get("calibration_left"),
         calibration_right=said.get("calibration_right"),
         board=said.get("board"),
         rig=said.get("rig"),
         markers=said.get("markers", "olive49"),
         size_mm=number_in(said, "size"),
-        ids=typed.id_list(said.get("ids")),
+        ids=_read(said, "ids", typed.id_list) or (),
         shutter=_shutter(said),
         row_time_us=(left_row, right_row),
-        band_hz=typed.band(said.get("band")),
+        band_hz=_read(said, "band", typed.band),
+        exposure_ms=number_in(said, "exposure"),
         left_stamps=said.get("left_stamps"),
         right_stamps=said.get("right_stamps"),
         accelerometer=said.get("accelerometer"),
         accelerometer_marker=_whole(said, "accelerometer_marker"),
+        preset=said.get("preset"),
         link=said.get("link", "no").lower() in ("yes", "y", "true", "1"),
     )
+
+
+def _read(said: Mapping[str, str], name: str, how: Callable[[str | None], Value]) -> Value | None:
+    try:
+        return how(said.get(name))
+    except UsageError as error:
+        raise FieldError(name, f"{said[name]!r} cannot be read.", error.remedy) from error
 
 
 def record_of(values: Mapping[str, str]) -> dict[str, object]:
@@ -122,60 +148,66 @@ def free_name(taken: Iterable[str]) -> str:
     return next(name for k in range(1, 10_000) if (name := f"T{k:02d}") not in known)
 
 
-def values_of(settings: TrialSettings, place: Callable[[str], Path]) -> dict[str, str]:
+def values_of(
+    settings: TrialSettings, place: Callable[[str], Path], same_rig: bool = True
+) -> dict[str, str]:
     """The fields that a trial like this one shares with it; ``place`` resolves a file's name.
 
-    Recordings, stamps and sensor files are the new trial's own and stay empty.
+    Recordings, stamps and sensor files are the new trial's own and stay empty. same_rig: the
+    cameras have not been moved, so that its calibration is taken over.
     """
     markers, cameras, calibration = settings.markers, settings.cameras, settings.calibration
     rows = [r for r in (cameras.left.row_time_us, cameras.right.row_time_us) if r is not None]
-    band, library = settings.vibration.band_hz, markers.library
+    band, library, exposure = settings.vibration.band_hz, markers.library, cameras.left.exposure_ms
+    rig = same_rig and place("rig.toml").exists()
     shared = {
-        "board": calibration.board,
-        "rig": str(place("rig.toml")) if place("rig.toml").exists() else None,
-        "size": markers.size_mm,
+        "board": None if rig else calibration.board,
+        "rig": str(place("rig.toml")) if rig else None,
+        "size": None if markers.size_mm is None else f"{markers.size_mm:g}",
         "ids": ",".join(map(str, markers.ids)),
         "markers": str(place(library)) if library.endswith(".toml") else library,
         "shutter": None if cameras.shutter == "unknown" else cameras.shutter,
         "row_time": ",".join(f"{row:g}" for row in rows) if len(rows) == 2 else None,
+        "exposure": None if exposure is None else f"{exposure:g}",
         "band": f"{band[0]:g}-{band[1]:g}" if band else None,
+        "place": settings.session.place,
+        "operator": settings.session.operator,
+        "cultivar": settings.tree.cultivar,
+        "machine": settings.machine.make,
     }
-    if shared["rig"]:
-        shared["board"] = None  # the same cameras, not moved: their calibration is taken over
     return {name: f"{value}" for name, value in shared.items() if value}
 
 
 def trial_name(values: Mapping[str, str]) -> str:
-    """The name of the new trial; UsageError where there is none or it is no name."""
+    """The name of the new trial; FieldError where there is none or it is no name."""
     name = values.get("trial", "").strip()
     if not name or name in (".", "..") or any(c in name for c in '/\\:*?"<>|'):
-        raise UsageError(
-            f"{name!r} is no name of a trial.", "It becomes a folder.", "Write e.g. 2026-11-20_T04."
-        )
+        what = f"{name!r} is no name of a trial: it becomes a folder."
+        raise FieldError("trial", what, "Write e.g. 2026-11-20_T04.")
     return name
 
 
 def number_in(said: Mapping[str, str], name: str) -> float | None:
-    """The number in a field; None where it is empty, UsageError where it is none."""
+    """The number in a field; None where it is empty, FieldError where it is none."""
     if name not in said:
         return None
     try:
         return float(said[name].replace(",", "."))
     except ValueError:
-        raise UsageError(f"{name} {said[name]!r} is no number.", "", "Write e.g. 60.") from None
+        raise FieldError(name, f"{said[name]!r} is no number.", "Write e.g. 60.") from None
 
 
 def _whole(said: Mapping[str, str], name: str) -> int | None:
     number = number_in(said, name)
     if number is not None and number != int(number):
-        raise UsageError(f"{said[name]!r} is no id.", "", "Write the marker's number, e.g. 3.")
+        raise FieldError(name, f"{said[name]!r} is no id.", "Write the marker's number, e.g. 3.")
     return None if number is None else int(number)
 
 
 def _shutter(said: Mapping[str, str]) -> str | None:
     word = said.get("shutter")
     if word not in (None, "rolling", "global"):
-        raise UsageError(f"shutter {word!r} is not known.", "", "Write rolling or global.")
+        raise FieldError("shutter", f"{word!r} is not known.", "Write rolling or global.")
     return word
 
 

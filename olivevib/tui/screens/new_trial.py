@@ -12,21 +12,22 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, VerticalScroll
 from textual.message import Message
-from textual.widgets import Button, Input
+from textual.widgets import Button, Input, Static
 from textual.worker import get_current_worker
 
 from olivevib.arrays import Grey
 from olivevib.errors import OlivevibError
 from olivevib.tui import jobs
+from olivevib.tui.form_words import sentence_of
 from olivevib.tui.frames import first_frame
 from olivevib.tui.harmless import harmless
 from olivevib.tui.loader import FormValues, form_values, guarded
+from olivevib.tui.look import Look, look_at
 from olivevib.tui.plan import (
     FIELDS,
     PATHS,
     free_name,
     guesses,
-    plan_of,
     record_of,
     trial_name,
 )
@@ -46,11 +47,14 @@ class NewTrialPage(Page):
     NAME = "new trial"
     HELP_TEXT = Help(
         "Two recordings, and either two recordings of the calibration board with its description "
-        "or the rig of an earlier calibration. Naming the left side fills in what lies beside it. "
-        "Everything is checked before anything is made; recordings are copied, never moved. "
-        "Ctrl+O, or the button beside a line, picks a file or chooses a value.",
-        "Give the marker size, the ids on the tree, the shutter and the band: without them a "
-        "frequency cannot be decided. All of it can be changed later (s on the trial).",
+        "or the rig of an earlier calibration. Naming the left side fills in what lies beside it; "
+        "what was said of the last trial stands there already. Ctrl+O, or the button beside a "
+        "line, picks a file or chooses a value. What is wrong with a line is told below when you "
+        "leave it. Everything is checked before anything is made; recordings are copied, never "
+        "moved.",
+        "Give the marker size, the ids on the tree, the shutter, the exposure and the band: "
+        "without them a frequency may stay undecided and amplitudes keep the blur. All of it can "
+        "be changed later (s on the trial).",
     )
     JUMPS = (Jump("f", "#form"),)
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -65,9 +69,24 @@ class NewTrialPage(Page):
             super().__init__()
             self.side, self.frame = side, frame
 
+    class Looked(Message):
+        """What is wrong with the form so far, or not said yet."""
+
+        def __init__(self, looked: Look) -> None:
+            super().__init__()
+            self.looked = looked
+
+    class Checked(Looked):
+        """The whole form has been looked at, to make the trial that it describes."""
+
+        def __init__(self, looked: Look, values: Mapping[str, str]) -> None:
+            super().__init__(looked)
+            self.values = values
+
     def __init__(self, workspace: Path, like: Path | None = None) -> None:
         super().__init__(workspace)
         self._like = like
+        self._filled = False
         self._used: Mapping[str, tuple[str, ...]] = {}
 
     def read(self) -> FormValues:
@@ -76,16 +95,16 @@ class NewTrialPage(Page):
 
     def show(self, value: object) -> None:
         """Fill what is empty."""
-        if not isinstance(value, FormValues):
+        if not isinstance(value, FormValues) or self._filled:
             return
-        self._used = value.used
-        if self._like is not None:
-            for name, text in value.shared.items():
-                field = self.query_one(f"#{name}", Input)
-                field.value = field.value or text
-            name = harmless(self._like.name, 40)
-            self.query_one("#form").border_subtitle = f"settings as in {name}"
-            self._like = None
+        self._used, self._filled = value.used, True
+        for name, text in value.shared.items():
+            field = self.query_one(f"#{name}", Input)
+            field.value = field.value or text
+        if value.source:
+            name = harmless(value.source, 40)
+            self.query_one("#form").border_subtitle = f"as in {name} until you change it"
+        self._look()
 
     def body(self) -> ComposeResult:
         """First frames above, the form below."""
@@ -96,6 +115,7 @@ class NewTrialPage(Page):
             form.border_title = "New trial"
             yield from form_rows(FIELDS)
             yield Button("Make the trial", id="make", variant="primary")
+        yield Static(id="told", markup=False)
 
     def on_mount(self) -> None:
         """Start at the name."""
@@ -146,12 +166,15 @@ class NewTrialPage(Page):
             field.focus()
 
     def _start(self) -> Path:
-        """Where to begin: beside what was named last, else the folder the app was started in."""
-        named = [Path(self.values[p]) for p in PATHS if self.values[p]]
-        return named[0].parent if named and named[0].parent.is_dir() else Path()
+        """Where to begin: beside what was named, else where a file was last picked, else here."""
+        named = [Path(self.values[p]).parent for p in PATHS if self.values[p]]
+        last = self.olive.kept.folder
+        places = [*named[:1], *([Path(last)] if last else [])]
+        return next((place for place in places if place.is_dir()), self.folder)
 
     def _picked(self, name: str, path: Path | None) -> None:
         if path is not None:
+            self.olive.keep(folder=str(path.parent))
             field = self.query_one(f"#{name}", Input)
             field.value = str(path)
             field.focus()
@@ -175,6 +198,7 @@ class NewTrialPage(Page):
                 self.query_one(f"#{other}", Input).value = found
             for side in SHOWN:
                 self._read_first(side, self.values[side])
+        self._look()
 
     @work(thread=True, group="first")
     def _read_first(self, side: str, path: str) -> None:
@@ -193,14 +217,40 @@ class NewTrialPage(Page):
             pane.show(frame, Window(0, 0, width, height), ())
             pane.border_title = f"{message.side}, {width} × {height} px"
 
-    # -- making ---------------------------------------------------------------------------------
+    # -- looking and making -----------------------------------------------------------------------
+
+    @work(thread=True, exclusive=True, group="look")
+    def _look(self) -> None:
+        """Look at what the form says so far, in a thread."""
+        looked = look_at(self.values)
+        if not get_current_worker().is_cancelled:
+            self.post_message(self.Looked(looked))
+
+    @on(Looked)
+    def _looked(self, message: Looked) -> None:
+        """Say what is wrong, or what is not said yet, below the form."""
+        looked, told = message.looked, self.query_one("#told", Static)
+        told.set_class(looked.error is not None, "-wrong")
+        told.update(harmless(sentence_of(looked.error) if looked.error else looked.unsaid, 400))
 
     def action_make(self) -> None:
         """Check the form and make the trial."""
-        plan = guarded(lambda: (trial_name(self.values), plan_of(self.values)))
-        if isinstance(plan, OlivevibError):
-            self.olive.show_error(plan)
-        else:
-            name, told = plan
-            record = record_of(self.values)
-            self.olive.start(jobs.make_trial(self.folder, name, told, record))
+        self._checking(self.values)
+
+    @work(thread=True, exclusive=True, group="read")
+    def _checking(self, values: Mapping[str, str]) -> None:
+        looked = look_at(values, whole=True)
+        if not get_current_worker().is_cancelled:
+            self.post_message(self.Checked(looked, values))
+
+    @on(Checked)
+    def _checked(self, message: Checked) -> None:
+        """Make the trial; or say what is wrong, with the cursor in its line."""
+        looked = message.looked
+        if looked.error is not None:
+            if looked.field:
+                self.query_one(f"#{looked.field}", Input).focus()
+            self.olive.show_error(looked.error)
+        elif looked.plan is not None:
+            name, record = trial_name(message.values), record_of(message.values)
+            self.olive.start(jobs.make_trial(self.folder, name, looked.plan, record))

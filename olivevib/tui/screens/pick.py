@@ -1,27 +1,32 @@
-"""Picking a file or folder: a tree to walk through, or a path to type."""
+"""Picking a file or folder: one folder at a time, narrowed by typing, or a path that is typed."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import ClassVar
 
-from rich.text import Text, TextType
+from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Vertical
+from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
-from textual.widgets import DirectoryTree, Footer, Input
+from textual.widgets import Button, Footer, Input, OptionList, Static
+from textual.widgets.option_list import Option
 
-from olivevib.tui.harmless import plain
+from olivevib.tui.harmless import harmless
+from olivevib.tui.views.folder import Entry, entries_of, entry_text, pictures_in
 
 
-class Tree(DirectoryTree):
-    """A folder, with names made harmless."""
+class Typed(Input):
+    """The line above the list; rubbing out in an empty one shows the folder above."""
 
-    def process_label(self, label: TextType) -> Text:
-        """A name as plain text."""
-        return plain(label)
+    def action_delete_left(self) -> None:
+        """Rub out, or go up."""
+        if self.value:
+            super().action_delete_left()
+        elif isinstance(self.screen, PickScreen):
+            self.screen.action_up()
 
 
 class PickScreen(ModalScreen[Path | None]):
@@ -29,52 +34,120 @@ class PickScreen(ModalScreen[Path | None]):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "dismiss", "Leave"),
-        Binding("f", "folder", "Take this folder"),
+        Binding("down", "move(1)", "Next", show=False),
+        Binding("up", "move(-1)", "Before", show=False),
+        Binding("pagedown", "move(10)", "Further", show=False),
+        Binding("pageup", "move(-10)", "Back", show=False),
+        Binding("ctrl+t", "folder", "Take this folder"),
         Binding("backspace", "up", "Folder above"),
     ]
 
     def __init__(self, title: str, start: Path) -> None:
         super().__init__()
-        self._heading, self._start = title, start.resolve()
+        self._heading, self._here = title, start.resolve()
+        self._entries: tuple[Entry, ...] = ()
 
     def compose(self) -> ComposeResult:
-        """Path above, tree below."""
+        """Where one is, a line to type in, what is there, two buttons for the mouse."""
         with Vertical(classes="dialog") as sheet:
-            sheet.border_title = self._heading
-            sheet.border_subtitle = "Enter takes a file · f takes a folder"
-            yield Input(placeholder="or type a path and press Enter", id="typed")
-            yield Tree(self._start, id="tree")
+            sheet.border_title = harmless(self._heading, 60)
+            sheet.border_subtitle = "type to narrow, or a path · Enter opens or takes · Esc leaves"
+            yield Static(id="here", markup=False)
+            yield Typed(placeholder="part of a name, or a path", id="typed", compact=True)
+            yield OptionList(id="entries")
+            with Horizontal(id="picks"):
+                yield Button("↑ folder above", id="above", compact=True)
+                yield Button("take this folder", id="take", compact=True)
         yield Footer()
 
     def on_mount(self) -> None:
-        """Start in the tree."""
-        self.query_one("#tree").focus()
-
-    @on(DirectoryTree.FileSelected)
-    def _file(self, event: DirectoryTree.FileSelected) -> None:
-        self.dismiss(event.path)
-
-    @on(Input.Submitted)
-    def _typed(self, event: Input.Submitted) -> None:
-        path = Path(event.value).expanduser()
-        if path.is_dir():
-            self._show(path)
-        elif path.exists():
-            self.dismiss(path)
-        else:
-            self.notify(f"{plain(path)} is not there.", severity="warning", markup=False)
+        """Start in the line: letters narrow the list, arrows move in it."""
+        self.query_one("#entries").can_focus = False
+        for button in self.query(Button):
+            button.can_focus = False
+        self._show(self._here)
+        self.query_one("#typed").focus()
 
     def _show(self, folder: Path) -> None:
-        tree = self.query_one("#tree", Tree)
-        tree.path = folder.resolve()
-        tree.focus()
+        """Another folder, nothing typed."""
+        self._here = folder.resolve()
+        self.query_one("#here", Static).update(harmless(self._here, 200))
+        take = self.query_one("#take", Button)
+        pictures = pictures_in(self._here)
+        take.label = f"take this folder ({pictures} pictures)" if pictures else "take this folder"
+        self.query_one("#typed", Input).value = ""
+        self._fill()
+
+    def _fill(self) -> None:
+        words = self.query_one("#typed", Input).value
+        try:
+            self._entries = entries_of(self._here, "" if _is_path(words) else words)
+            fault = Text("nothing here by that name" if words else "an empty folder")
+        except OSError as error:
+            self._entries, fault = (), Text(f"cannot be read: {error.strerror}")
+        listed = self.query_one("#entries", OptionList)
+        listed.clear_options()
+        listed.add_options([Option(entry_text(entry)) for entry in self._entries])
+        if self._entries:
+            listed.highlighted = 0
+        else:
+            listed.add_option(Option(fault, disabled=True))
+
+    @on(Input.Changed, "#typed")
+    def _narrow(self) -> None:
+        self._fill()
+
+    @on(Input.Submitted, "#typed")
+    def _entered(self, event: Input.Submitted) -> None:
+        """A path that was typed, else what is marked."""
+        path = Path(event.value).expanduser()
+        if _is_path(event.value) and not path.exists():
+            self.query_one("#here", Static).update(f"{harmless(path, 150)} is not there.")
+        elif _is_path(event.value):
+            self._take(path)
+        else:
+            at = self.query_one("#entries", OptionList).highlighted
+            if at is not None and at < len(self._entries):
+                self._take(self._entries[at].path)
+
+    @on(OptionList.OptionSelected)
+    def _clicked(self, event: OptionList.OptionSelected) -> None:
+        if event.option_index < len(self._entries):
+            self._take(self._entries[event.option_index].path)
+
+    def _take(self, path: Path) -> None:
+        """Open a folder, give a file."""
+        if path.is_dir():
+            self._show(path)
+        else:
+            self.dismiss(path)
+
+    @on(Button.Pressed)
+    def _pressed(self, event: Button.Pressed) -> None:
+        event.stop()
+        if event.button.id == "above":
+            self.action_up()
+        else:
+            self.action_folder()
+
+    def action_move(self, by: int) -> None:
+        """Mark another entry."""
+        listed = self.query_one("#entries", OptionList)
+        at = (listed.highlighted or 0) + by
+        if self._entries:
+            listed.highlighted = max(0, min(at, len(self._entries) - 1))
 
     def action_folder(self) -> None:
-        """Take the marked folder, or the one that the marked file is in."""
-        node = self.query_one("#tree", Tree).cursor_node
-        path = node.data.path if node is not None and node.data is not None else self._start
-        self.dismiss(path if path.is_dir() else path.parent)
+        """Take the folder that is marked, or else the one that is shown."""
+        at = self.query_one("#entries", OptionList).highlighted
+        marked = self._entries[at] if at is not None and at < len(self._entries) else None
+        typed = self.query_one("#typed", Input).value
+        self.dismiss(marked.path if marked and marked.folder and typed else self._here)
 
     def action_up(self) -> None:
         """Show the folder above."""
-        self._show(Path(self.query_one("#tree", Tree).path).parent)
+        self._show(self._here.parent)
+
+
+def _is_path(words: str) -> bool:
+    return "/" in words or "\\" in words or words.startswith("~")
