@@ -16,7 +16,8 @@ from olivevib.files.accelerometer.clock import stamp_timing
 
 
 def timing(stamps: np.ndarray, same: np.ndarray | None = None):  # type: ignore[no-untyped-def]
-    return stamp_timing(stamps, np.zeros(stamps.size, bool) if same is None else same, None, "a")
+    repeats = np.zeros(stamps.size, bool) if same is None else same
+    return stamp_timing(stamps, lambda: repeats, None, "a")
 
 
 def read(

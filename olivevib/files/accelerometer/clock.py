@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -33,14 +34,16 @@ def even_timing(n: int, rate_hz: float, t0_s: float = 0.0, start: datetime | Non
     return Timing(np.ones(n, np.bool_), t_s, Clock(rate_hz, float("nan"), "rate", start=start))
 
 
-def stamp_timing(stamps_s: Floats, same: Bools, start: datetime | None, source: str) -> Timing:
+def stamp_timing(
+    stamps_s: Floats, same: Callable[[], Bools], start: datetime | None, source: str
+) -> Timing:
     """Times from stamps: turned-over counters mended, bad rows out, then the line or the stamps.
 
-    same (N,): the row repeats all values of the row before. A repeated stamp with repeated values
-    is a repeated row and goes; repeated stamps with new values come of coarse stamps and are spread
-    up to the next stamp. Stamps that scatter about an even clock give the line's times; stamps
-    that wander give themselves (knowledge of the field: vibration analysis 4.1). InputError where
-    the clock starts anew within the file.
+    same() (N,): the row repeats all values of the row before; asked only where stamps repeat. A
+    repeated stamp with repeated values is a repeated row and goes; repeated stamps with new values
+    come of coarse stamps and are spread up to the next stamp. Stamps that scatter about an even
+    clock give the line's times; stamps that wander give themselves (knowledge of the field:
+    vibration analysis 4.1). InputError where the clock starts anew within the file.
     """
     if (np.diff(stamps_s) > 0).all() and stamps_s.size > 1:  # as most files are (NaN fails, too)
         t_s, clock = _fit(stamps_s, start, source, _quantum(stamps_s))
@@ -52,7 +55,8 @@ def stamp_timing(stamps_s: Floats, same: Bools, start: datetime | None, source: 
     repeated = np.zeros(keep.size, np.bool_)
     rows = np.flatnonzero(keep)
     tied = np.concatenate([[False], np.diff(stamps[rows]) == 0])
-    repeated[rows[tied]] = same[rows[tied]] & (np.diff(rows, prepend=-1)[tied] == 1)
+    if tied.any():
+        repeated[rows[tied]] = same()[rows[tied]] & (np.diff(rows, prepend=-1)[tied] == 1)
     keep &= ~repeated
     t_s = _spread_ties(stamps[keep])
     if t_s.size < 2 or t_s[-1] <= t_s[0]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 
 import numpy as np
 
@@ -45,6 +46,8 @@ def interpret(table: Table, options: ImportOptions, source: str) -> Acceleromete
     values, gravity, axes = _mapped(
         raw * scale.factor, rest.vector * scale.factor, choice, options, source
     )
+    values.flags.writeable = False  # this record's own: no copy is needed
+    timing.t_s.flags.writeable = False
     record = AccelerometerRecord(
         samples=Samples(timing.t_s, values, "acceleration", "m/s2", axes),
         clock=timing.clock,
@@ -90,7 +93,7 @@ def _timing(
     start = _declared_start(options, source) or table.start or header_start(table)
     if options.rate_hz is not None:
         return even_timing(table.rows, options.rate_hz, start=start), ()
-    same = limits.repeats(raw)
+    same = partial(limits.repeats, raw)
     if table.stamps_s is not None:
         timing = stamp_timing(table.stamps_s, same, start, source)
         return timing, ()

@@ -28,7 +28,7 @@ def clipped(values: Floats) -> int:
 
 
 def _piled(values: Floats, top: float) -> int:
-    at_top = int((values == top).sum())
+    at_top = int(np.count_nonzero(values == top))
     if at_top < 5:
         return 0
     good = values[np.isfinite(values)]

@@ -16,7 +16,7 @@ from olivevib.files.accelerometer.encoding import find_encoding
 from olivevib.files.accelerometer.record import SEPARATORS, Channel, ImportOptions, Table
 from olivevib.files.accelerometer.sniff import SNIFF_BYTES, TextLayout, lines_of, sniff
 
-_LINE_FEED = 10
+_SKIPPED = "Skipping line "  # what the reader says of each row with too many cells
 _NEWLINE = re.compile(rb"\r\n|\n|\r")
 
 
@@ -106,8 +106,8 @@ def _read_frame(data: bytes, layout: TextLayout, source: str) -> tuple[Any, int]
     stream = io.BytesIO(body)
     stream.seek(start)
     try:
-        with warnings.catch_warnings():  # chunks of a column with bad cells differ in type
-            warnings.simplefilter("ignore", pd.errors.DtypeWarning)
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", pd.errors.ParserWarning)
             frame = pd.read_csv(
                 stream,
                 sep=r"\s+" if dialect.separator == " " else dialect.separator,
@@ -119,8 +119,9 @@ def _read_frame(data: bytes, layout: TextLayout, source: str) -> tuple[Any, int]
                 comment=layout.comment or None,
                 encoding=encoding,
                 encoding_errors="replace",
-                on_bad_lines="skip",
+                on_bad_lines="warn",
                 skipinitialspace=layout.padded,
+                low_memory=False,  # a column in one piece: its type is decided once
                 engine="c",
             )
     except (ValueError, pd.errors.ParserError, OverflowError, LookupError) as error:
@@ -129,7 +130,7 @@ def _read_frame(data: bytes, layout: TextLayout, source: str) -> tuple[Any, int]
             str(error).splitlines()[0] if str(error) else "",
             "Open it in an editor; name separator and decimal mark if the guess is wrong.",
         ) from error
-    return frame, _skipped(body, start, layout, len(frame))
+    return frame, sum(str(warning.message).count(_SKIPPED) for warning in told)
 
 
 def _body(data: bytes, layout: TextLayout) -> tuple[bytes, str, int]:
@@ -143,15 +144,6 @@ def _body(data: bytes, layout: TextLayout) -> tuple[bytes, str, int]:
     if not data.endswith((b"\n", b"\r")):
         data = _without_cut_row(data, layout)
     return data, encoding, start
-
-
-def _skipped(body: bytes, start: int, layout: TextLayout, rows: int) -> int:
-    """How many lines of cells are missing from ``rows``; blank and comment lines do not count."""
-    if np.count_nonzero(np.frombuffer(body, np.uint8, offset=start) == _LINE_FEED) <= rows:
-        return 0
-    lines = body[start:].split(b"\n")
-    mark = layout.comment.encode() or b"\0"
-    return max(0, sum(1 for x in lines if x.strip() and not x.lstrip().startswith(mark)) - rows)
 
 
 def _without_cut_row(data: bytes, layout: TextLayout) -> bytes:
