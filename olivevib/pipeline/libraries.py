@@ -6,8 +6,10 @@ import numpy as np
 
 from olivevib.arrays import Floats
 from olivevib.detection import Wrapped
+from olivevib.detection.foreign import dictionary
 from olivevib.errors import UsageError
 from olivevib.marker import MarkerLibrary, load_library
+from olivevib.reconstruction.motion import Pattern
 from olivevib.trial import Trial, TrialSettings
 from olivevib.trial.fingerprints import library_file
 
@@ -57,3 +59,18 @@ def corners_mm(library: MarkerLibrary, settings: TrialSettings, marker: int) -> 
         )
     flat = library.layout.cornerstones * (size / library.layout.modules)
     return np.column_stack([flat, np.zeros(4)])
+
+
+def pattern_of(library: MarkerLibrary, settings: TrialSettings, marker: int) -> Pattern | None:
+    """The dark modules of one marker with their size; None where it is not flat, or has no size."""
+    size = settings.markers.size_of(marker)
+    bent = any(one.id == marker and one.wrapped for one in settings.markers.marker)
+    if size is None or bent:
+        return None
+    modules = library.layout.modules
+    if library.family == "olive":
+        row = int(np.flatnonzero(library.ids == marker)[0])
+        dark = library.layout.pattern(library.codes[row])
+    else:
+        dark = dictionary(library.dictionary).generateImageMarker(marker, modules) == 0
+    return Pattern(dark, size / modules)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from olivevib.errors import Caution, InputError
 from olivevib.files.store import write_stage
 from olivevib.geometry import StereoRig
 from olivevib.pipeline.fitted import fitted_samples, with_lines
-from olivevib.pipeline.libraries import corners_mm, trial_library
+from olivevib.pipeline.libraries import corners_mm, pattern_of, trial_library
 from olivevib.pipeline.motions import marker_motion, surveyed
 from olivevib.pipeline.rig_in_use import chosen_world, rig_trust
 from olivevib.pipeline.sampling_time import (
@@ -26,6 +27,7 @@ from olivevib.progress import Tick, silent
 from olivevib.reconstruction import Reconstruction, TrialClock, clock_from_motion
 from olivevib.reconstruction import reconstruct as reconstruct_tracks
 from olivevib.reconstruction.continuous import decided, trajectory_of
+from olivevib.reconstruction.motion import Pattern
 from olivevib.reconstruction.world import placed, with_rig_sigma
 from olivevib.trial import Trial
 from olivevib.trial.records.tracks import StoredTracks
@@ -105,7 +107,9 @@ def with_motion(
     """The reconstruction with the continuous-time fit; with its paths where it could decide."""
     facts = SamplingFacts(tracks.cameras["left"].rate_hz)
     steady = steady_interval(result.trajectory, facts.sway_hz)
-    fit = fit_trial(trial, TrialTimes(tracks, result.clock, steady), rig, corners, tick)
+    patterns = _patterns(trial, corners) if tracks.localiser == "template" else {}
+    times = TrialTimes(tracks, result.clock, steady)
+    fit = fit_trial(trial, times, rig, corners, patterns, tick)
     if fit is None or not decided(fit):
         return replace(result, motion=fit)
     clock = fitted_clock(fit, result.clock)
@@ -113,6 +117,13 @@ def with_motion(
     again = reconstruct_tracks(tracks.left, tracks.right, rig, clock, corners, settings, tick)
     path = trajectory_of(fit, again.trajectory)
     return replace(again, trajectory=path, motion=fit)
+
+
+def _patterns(trial: Trial, ids: Iterable[int]) -> dict[int, Pattern]:
+    """Of the markers that are flat."""
+    library = trial_library(trial)
+    found = {i: pattern_of(library, trial.settings, i) for i in ids}
+    return {i: pattern for i, pattern in found.items() if pattern is not None}
 
 
 def _check_rig(rig: StereoRig, tracks: StoredTracks) -> None:

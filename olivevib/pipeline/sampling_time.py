@@ -15,7 +15,14 @@ from olivevib.geometry import StereoRig
 from olivevib.pipeline.recordings import SIDES
 from olivevib.progress import Tick
 from olivevib.reconstruction import Trajectory, TrialClock
-from olivevib.reconstruction.motion import Anchor, MotionFit, MotionSettings, fit_motion, observe
+from olivevib.reconstruction.motion import (
+    Anchor,
+    MotionFit,
+    MotionSettings,
+    Pattern,
+    fit_motion,
+    observe,
+)
 from olivevib.reconstruction.motion.types import Gain
 from olivevib.tracking import Track
 from olivevib.trial import Trial
@@ -133,9 +140,13 @@ def fit_trial(
     times: TrialTimes,
     rig: StereoRig,
     corners_mm: Mapping[int, Floats],
+    patterns: Mapping[int, Pattern],
     tick: Tick,
 ) -> MotionFit | None:
-    """The continuous-time fit of a trial; None where no marker was seen often enough for one."""
+    """The continuous-time fit of a trial; None where no marker was seen often enough for one.
+
+    patterns: of the flat markers, where their drawings were fitted.
+    """
     tracks, clock = times.tracks, times.clock
     left = [_within(t, times.steady_s) for t in tracks.left]
     right = [_within(t, times.steady_s) for t in tracks.right]
@@ -147,7 +158,7 @@ def fit_trial(
         gain=_gain(tracks.localiser),
     )
     try:
-        seen = observe(left, right, corners_mm, rows)
+        seen = observe(left, right, corners_mm, rows, patterns)
         return fit_motion(seen, rig, anchor(trial, tracks, clock), settings, tick)
     except ValueError:  # no marker was seen often enough by both cameras
         return None

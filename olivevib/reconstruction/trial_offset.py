@@ -25,6 +25,8 @@ STEPS = 8
 BY_S = 0.5e-3  # for differences
 FOLLOWED_PX = 1.0  # rms by which every second frame may miss the frame between
 FEWEST = 40  # samples
+MISSED = 5.0  # times the sigma of a centre by which the lines may be missed, rms
+LEAST_PX = 0.01  # what lens and interpolation may add to any sigma
 SURE_S = 1.0e-3  # a larger sigma tells nothing that is worth using
 CORRELATED = 2.0  # neighbouring frames share their errors: sigma counts every fourth
 
@@ -36,6 +38,8 @@ def clock_from_motion(
 
     Looks within 0.25 s. Unchanged where the motion is too fast for the frame rate, too small, along
     the epipolar lines only, or where two offsets fit equally well (a motion that repeats itself).
+    A motion above half the frame rate looks slow, too; it gives itself away, since no offset makes
+    its cameras meet as closely as they see: then nothing is said either.
     """
     pairs = _pairs(left, right)
     if not pairs or not all(followed(t) for pair in pairs for t in pair):
@@ -47,6 +51,8 @@ def clock_from_motion(
     best = min(found, key=lambda f: f[2])
     rivals = [f for f in found if abs(f[0] - best[0]) > 5 * best[1] + 1e-3]
     if best[1] > SURE_S or any(f[2] < 1.5 * best[2] for f in rivals):
+        return clock
+    if best[2] > max(MISSED * _noise_px(pairs), LEAST_PX):
         return clock
     return replace(
         clock, right_offset_s=best[0], right_offset_sigma_s=best[1], source="slow motion"
@@ -70,6 +76,12 @@ def _pairs(left: Sequence[Track], right: Sequence[Track]) -> list[tuple[Track, T
     by_right = {t.id: t for t in right}
     both = [(t, by_right[t.id]) for t in left if t.id in by_right]
     return [p for p in both if min(p[0].seen, p[1].seen) >= FEWEST]
+
+
+def _noise_px(pairs: list[tuple[Track, Track]]) -> float:
+    """Sigma of a centre in one direction, median over all sightings."""
+    variances = [np.trace(t.centre_cov_px2, axis1=1, axis2=2) / 2 for p in pairs for t in p]
+    return float(np.sqrt(np.nanmedian(np.concatenate(variances))))
 
 
 class _Lines:

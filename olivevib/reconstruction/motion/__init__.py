@@ -1,5 +1,6 @@
 """The continuous-time motion of markers, seen row by row, and its true frequency."""
 
+from olivevib.reconstruction.motion.drawing import Pattern
 from olivevib.reconstruction.motion.fit import fit_motion
 from olivevib.reconstruction.motion.observe import observe
 from olivevib.reconstruction.motion.types import (
@@ -24,6 +25,7 @@ __all__ = [
     "MotionFit",
     "MotionSettings",
     "Observations",
+    "Pattern",
     "Sightings",
     "Timing",
     "fit_motion",

@@ -91,11 +91,12 @@ def fit_motion(
         if pace is not None and pace.gain > max(WORSE, grown.gain):
             fast = pace.ridge.fastest_hz_s
             again = prepare(observations, rig, clock, settings, pace.phase)
-            rate = observations.frame_rate_hz
-            followed = weigh_paces(again.model, pace, rate, band_of(ready), tick)
+            rate, sigma = observations.frame_rate_hz, again.offset_sigma_s
+            followed = weigh_paces(again.model, pace, rate, band_of(ready), sigma, tick)
             if followed is not None:
-                ready, kind, weighed = again, "wandering", followed[1]
-                model, best = refine(ready, followed[0], weighed.branches[0])
+                trial = refine(again, followed[0], followed[1].branches[0])
+                if misfit(again, *trial) < misfit(ready, model, best):
+                    ready, kind, weighed, (model, best) = again, "wandering", followed[1], trial
         elif grown.gain > WORSE:
             ready = growing(ready, grown)
             weighed = br.weigh(ready.model, candidates, ready.offset_sigma_s, tick)
@@ -176,6 +177,11 @@ def refine(ready: Prepared, model: Model, branch: Branch) -> tuple[Model, Branch
 def chi2_of(model: Model, branch: Branch) -> float:
     """Of the fit over the measured noise."""
     return branch.chi2 / degrees_of_freedom(model)
+
+
+def misfit(ready: Prepared, model: Model, branch: Branch) -> float:
+    """Chi2 over the localiser's own noise: comparable between models that measured theirs."""
+    return chi2_of(model, branch) * ready.pixels.scale**2
 
 
 def table_of(ready: Prepared, weighed: br.Weighed, chi2: float) -> BranchTable:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from olivevib.arrays import Floats
+from olivevib.reconstruction.motion.drawing import Pattern, drawn, nodes
 from olivevib.reconstruction.motion.types import MarkerSightings, Observations, Sightings
 from olivevib.signals import State
 from olivevib.tracking import Track
@@ -19,11 +21,14 @@ def observe(
     right: Sequence[Track],
     corners_mm: Mapping[int, Floats],
     row_times_s: tuple[float, float] = (0.0, 0.0),
+    patterns: Mapping[int, Pattern] | None = None,
 ) -> Observations:
     """Sightings of every marker that both cameras tracked; flagged samples are left out.
 
     corners_mm: for each id the corners (4, 3) in the marker's frame; row_times_s: the (left, right)
-    row times with which Track.t_s was made, so that the frame's own time can be restored.
+    row times with which Track.t_s was made, so that the frame's own time can be restored. patterns:
+    of the markers whose tracks come from a drawing fitted to the whole marker; the corners of
+    others were each seen by itself.
     Raises ValueError where no marker was seen often enough by both.
     """
     pairs = {t.id: [t] for t in left}
@@ -34,7 +39,9 @@ def observe(
     for id_, tracks in sorted(pairs.items()):
         views = [sightings(t, row) for t, row in zip(tracks, row_times_s, strict=False)]
         if len(views) == 2 and min(v.frame.size for v in views) >= FEWEST:
-            markers.append(MarkerSightings(id_, corners_mm[id_], views[0], views[1]))
+            marker = MarkerSightings(id_, corners_mm[id_], views[0], views[1])
+            pattern = None if patterns is None else patterns.get(id_)
+            markers.append(marker if pattern is None else _by_drawing(marker, pattern))
         else:
             skipped.append(id_)
     if not markers:
@@ -62,3 +69,16 @@ def sightings(track: Track, row_time_s: float) -> Sightings:
     return Sightings(
         track.frame[good], zero, row, px, track.corners_cov_px2[good], track.exposure_s[good]
     )
+
+
+def _by_drawing(marker: MarkerSightings, pattern: Pattern) -> MarkerSightings:
+    """The marker as its fitted drawing reports it, by its nodes."""
+    stones = marker.points_mm[:, :2] / pattern.module_mm
+    views = []
+    for view in (marker.left, marker.right):
+        fitted = drawn(pattern.dark, stones, view.px)
+        above = (view.row - view.px[..., 1]).mean(axis=1, keepdims=True)
+        views.append(replace(view, row=above + fitted.px[..., 1], drawn=fitted))
+    places = pattern.module_mm * nodes(len(pattern.dark))
+    flat = np.column_stack([places, np.zeros(len(places))])
+    return replace(marker, left=views[0], right=views[1], nodes_mm=flat)

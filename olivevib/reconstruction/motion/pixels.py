@@ -1,7 +1,8 @@
 """What the pixels say without any model of time: noise, apparent frequency, pace of the sway.
 
-Each coordinate of each corner is a sum of a spline and a sine on the frames' own times. An alias
-and its original fit alike, so nothing here favours a branch, a row time or an offset.
+Each coordinate of each corner is a sum of a spline and a sine on the frames' own times; a marker
+that is lower in the picture is seen later, so the sine's phase may go with its row, by any amount.
+An alias and its original fit alike, so nothing here favours a branch, a row time or an offset.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from olivevib.arrays import Floats
 from olivevib.reconstruction.motion.spline import knots_over
@@ -19,6 +21,7 @@ SPACINGS_S = (0.4, 0.3, 0.2, 0.15, 0.1)  # of knots, longest first
 RISE = 1.05  # of the noise variance that a longer spacing may cost
 SLOW_HZ = 2.7  # a line that appears slower is left to the spline when its spacing is chosen
 OWN_FRAMES = 12.0  # frames that the localiser's own covariance counts for
+SHARP = {"xatol": 1e-6}  # Hz: a cycle's phase over a minute to 0.4 mrad
 LEAST_FREE = 24  # degrees of freedom below which no noise is measured
 
 
@@ -74,11 +77,12 @@ def look(
     spacings = (knot_s,) if knot_s else tuple(s for s in SPACINGS_S if s >= 2.5 / rate)
     trials = []
     for step in spacings:
-        power, bases = _scan(views, step, f)
-        peaks = _peaks(f, power, 2.0 / span)
+        lines = [_without_sway(v, step) for v in views]
+        power = np.sum([line_power(*line, f) for line in lines], axis=0)
+        peaks = tuple(_sharpened(lines, peak, f[1] - f[0]) for peak in _peaks(f, power, 2.0 / span))
         noise = tuple(
             _noise(v, Q, _phase(v, peaks, phase), harmonics, size)
-            for v, Q in zip(views, bases, strict=True)
+            for v, (_, Q, _) in zip(views, lines, strict=True)
         )
         trials.append((step, power, peaks, noise))
     sizes = [_size(views, t[3]) for t in trials]
@@ -91,17 +95,13 @@ def look(
     return Pixels(step, f, power, peaks, noise, float(np.sqrt(sizes[pick])))
 
 
-def _scan(views: list[Sightings], step: float, f: Floats) -> tuple[Floats, list[Floats]]:
-    total, bases = np.zeros(f.size), []
-    for v in views:
-        t = v.row_zero_s
-        Q = np.linalg.qr(knots_over(t[0], t[-1], step).matrix(t))[0]
-        bases.append(Q)
-        y = v.px.reshape(t.size, -1)
-        W = np.linalg.inv(np.linalg.cholesky(v.covariance_px2.mean(axis=0)))
-        r = (y - Q @ (Q.T @ y)) @ W.T
-        total += line_power(t, Q, r, f)
-    return total, bases
+def _without_sway(v: Sightings, step: float) -> tuple[Floats, Floats, Floats]:
+    """Times, orthonormal spline basis, and whitened pixels (N, d) with the spline taken out."""
+    t = v.row_zero_s
+    Q = np.linalg.qr(knots_over(t[0], t[-1], step).matrix(t))[0]
+    y = v.px.reshape(t.size, -1)
+    W = np.linalg.inv(np.linalg.cholesky(v.covariance_px2.mean(axis=0)))
+    return t, Q, np.asarray((y - Q @ (Q.T @ y)) @ W.T)
 
 
 def line_power(t: Floats, Q: Floats, r: Floats, f: Floats) -> Floats:
@@ -137,6 +137,18 @@ def _peaks(f: Floats, power: Floats, apart_hz: float, most: int = 2) -> tuple[fl
     return tuple(found)
 
 
+def _sharpened(
+    lines: list[tuple[Floats, Floats, Floats]], peak_hz: float, reach_hz: float
+) -> float:
+    """The frequency of most power near a peak of the grid."""
+
+    def lost(f_hz: float) -> float:
+        return -sum(float(line_power(*line, np.array([f_hz]))[0]) for line in lines)
+
+    bounds = (max(peak_hz - reach_hz, 0.5 * peak_hz), peak_hz + reach_hz)
+    return float(minimize_scalar(lost, bounds=bounds, method="bounded", options=SHARP).x)
+
+
 def _phase(
     v: Sightings, peaks: tuple[float, ...], phase: Callable[[Floats], Floats] | None
 ) -> Floats | None:
@@ -160,9 +172,12 @@ def _noise(
     n = v.row_zero_s.size
     columns = [Q]
     even = np.ones(n) if size is None else size(v.row_zero_s)
+    lower = v.row.mean(axis=1) - v.row.mean()
+    lower = lower / max(float(np.abs(lower).max()), 1e-9)
     if phase is not None:
         for h in range(1, harmonics + 1):
-            columns.append(even[:, None] * np.column_stack([np.cos(h * phase), np.sin(h * phase)]))
+            line = even[:, None] * np.column_stack([np.cos(h * phase), np.sin(h * phase)])
+            columns += [line, lower[:, None] * line]
     basis = np.linalg.qr(np.column_stack(columns))[0]
     y = v.px.reshape(n, -1)
     r = y - basis @ (basis.T @ y)

@@ -37,9 +37,9 @@ class Pose:
 
 @dataclass(frozen=True)
 class Problem:
-    """Both cameras' frames of one marker stacked (N): zero_s, right (N,), rho (N, P) rows from
-    the reference row; V (N, P, 2P, 6) whitened Jacobians; y (N, 2P) whitened data such that
-    y = sum_j V_j xi(t_j) + noise.
+    """Both cameras' frames of one marker stacked (N): zero_s, right (N,), rho (N, K) rows of the
+    nodes from the reference row; V (N, K, 2P, 6) whitened Jacobians; y (N, 2P) whitened data such
+    that y = sum_j V_j xi(t_j) + noise.
     """
 
     zero_s: Floats
@@ -105,18 +105,20 @@ def linearise(
     at: tuple[Floats, Floats],
     reference_row: float,
 ) -> Problem:
-    """The linear problem about the motion ``at``: xi of the left and right points (N, P, 6)."""
+    """The linear problem about the motion ``at``: xi of the left and right nodes (N, K, 6)."""
     parts = []
     for view, W, xi, other in (
         (marker.left, whiten.left, at[0], None),
         (marker.right, whiten.right, at[1], rig),
     ):
         camera = rig.left if other is None else rig.right
-        px, J = project(camera, other, pose, marker.points_mm, xi)
-        data = view.px - px + np.einsum("npij,npj->npi", J, xi)
-        n, p = data.shape[:2]
-        split = W.reshape(n, 2 * p, p, 2).transpose(0, 2, 1, 3)  # (N, P, 2P, 2)
-        V, y = split @ J, np.einsum("nij,nj->ni", W, data.reshape(n, 2 * p))
+        px, J = project(camera, other, pose, marker.moving_mm, xi)
+        seen = view.px if view.drawn is None else view.drawn.px
+        data = seen - px + np.einsum("npij,npj->npi", J, xi)
+        M = W if view.drawn is None else W @ view.drawn.reported  # (N, 2P, 2K)
+        n, k = data.shape[:2]
+        split = M.reshape(n, -1, k, 2).transpose(0, 2, 1, 3)  # (N, K, 2P, 2)
+        V, y = split @ J, np.einsum("nij,nj->ni", M, data.reshape(n, 2 * k))
         parts.append((view.row_zero_s, np.full(n, other is not None), view.row, V, y))
     zero, right, row, V, y = (np.concatenate(c) for c in zip(*parts, strict=True))
     return Problem(zero, right, row - reference_row, V, y)

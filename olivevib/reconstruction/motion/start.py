@@ -55,7 +55,7 @@ def about_sway(
             whitenings(marker.left, pixels.noise[2 * m][0]),
             whitenings(marker.right, pixels.noise[2 * m + 1][0]),
         )
-        p = len(marker.points_mm)
+        p = len(marker.moving_mm)
         at = tuple(np.zeros((v.frame.size, p, 6)) for v in (marker.left, marker.right))
         row = observations.reference_row
         problem = linearise(marker, rig, pose, white, (at[0], at[1]), row)

@@ -14,6 +14,7 @@ from olivevib.reconstruction.motion.branches import (
     distinct,
     families,
     merged,
+    offset_starts,
     prefer_double,
 )
 from olivevib.reconstruction.motion.pixels import SLOW_HZ, line_power, views_of
@@ -275,7 +276,12 @@ def growth_of(
 
 
 def weigh_paces(
-    model: Model, pace: Pace, rate_hz: float, band_hz: tuple[float, float], tick: Tick
+    model: Model,
+    pace: Pace,
+    rate_hz: float,
+    band_hz: tuple[float, float],
+    offset_sigma_s: float,
+    tick: Tick,
 ) -> tuple[Model, Weighed] | None:
     """Branches with the wandering phase, best first, and the model of the best."""
     fitted, models = [], {}
@@ -285,11 +291,10 @@ def weigh_paces(
         h = 1 if abs(abs(f - rate_hz * round(f / rate_hz)) - pace.f_hz) < 0.05 else 2
         sign = 1.0 if h * f >= rate_hz * round(h * f / rate_hz) else -1.0
         trial = with_phase(model, pace.psi, sign * pace.bend / h, pace.span)
-        theta = trial.theta0.copy()
-        theta[0] = f
-        branch = settle(trial, theta, 6)
-        fitted.append(branch)
-        models[id(branch)] = trial
+        for start in offset_starts(trial, float(f), offset_sigma_s):
+            branch = settle(trial, start, 6)
+            fitted.append(branch)
+            models[id(branch)] = trial
     if not fitted:
         return None
     weighed = prefer_double(distinct(fitted, 0.05), NEAR_BEST, 0.02)
