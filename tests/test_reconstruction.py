@@ -228,6 +228,22 @@ def test_motion_that_the_frames_do_not_follow_tells_no_offset():
     assert clock_from_motion([left], [right], rig(), TrialClock()).source == "unknown"
 
 
+def test_an_alias_that_looks_slow_tells_no_offset(monkeypatch):
+    """25 Hz look like 5 Hz: 8.7 ms apart, the cameras meet best 50 ms beside that, but not well."""
+
+    def shaken(t: float) -> np.ndarray:
+        turn, sway = 2 * np.pi * 25.0 * t, 2 * np.pi * 0.5 * t
+        return np.array([3 * np.cos(turn), 1.5 * np.sin(turn) + 2 * np.sin(sway), 1400])
+
+    pairs = [late_tracks(shaken, 0.0087, 0.0, 0.01) for _ in range(2)]
+    left, right = ([replace(p[k], id=4 + m) for m, p in enumerate(pairs)] for k in (0, 1))
+    assert clock_from_motion(left, right, rig(), TrialClock()).source == "unknown"
+    monkeypatch.setattr("olivevib.reconstruction.trial_offset.MISSED", 1e9)
+    wrong = clock_from_motion(left, right, rig(), TrialClock())
+    assert wrong.source == "slow motion"
+    assert abs(wrong.right_offset_s - 0.0087) > 20 * wrong.right_offset_sigma_s
+
+
 def test_a_marker_at_rest_tells_no_offset():
     left, right = late_tracks(lambda _: np.array([50.0, 20, 1400]), 0.004, 0.0, 0.05)
     assert clock_from_motion([left], [right], rig(), TrialClock()).source == "unknown"

@@ -47,19 +47,12 @@ def at_times(track: Track, track_t_s: Floats, t_s: Floats) -> View:
     must know the band. Covariances are those of independent neighbours.
     """
     seen = np.flatnonzero(np.isfinite(track.centre_px[:, 0]))
-    n = t_s.size
-    pick, weight = np.zeros((n, 4), np.int64), np.zeros((n, 4))
-    good = np.zeros(n, dtype=np.bool_)
+    pick, weight = np.zeros((t_s.size, 4), np.int64), np.zeros((t_s.size, 4))
     if seen.size >= 2:
-        period = float(np.median(np.diff(track_t_s)))
-        times = track_t_s[seen]
-        after = np.clip(np.searchsorted(times, t_s), 1, seen.size - 1)
-        for k in range(n):
-            choice = _neighbours(times, int(after[k]), float(t_s[k]), LARGEST_GAP * period)
-            if choice is not None:
-                rows, w = choice
-                pick[k, : len(rows)], weight[k, : len(rows)] = seen[rows], w
-                good[k] = True
+        gap = LARGEST_GAP * float(np.median(np.diff(track_t_s)))
+        rows, weight = _neighbours(track_t_s[seen], t_s, gap)
+        pick = seen[rows]
+    good: Bools = np.any(weight != 0, axis=1)
     nearest = np.abs(track_t_s[None] - t_s[:, None]).argmin(axis=1)
     view = _take(track, pick, weight, good)
     flagged = (track.state[pick] == State.FLAGGED) & (weight != 0)
@@ -69,26 +62,35 @@ def at_times(track: Track, track_t_s: Floats, t_s: Floats) -> View:
     return View(view.centre_px, view.centre_cov_px2, view.corners_px, view.corners_cov_px2, state)
 
 
-def _neighbours(
-    times: Floats, after: int, t: float, gap: float
-) -> tuple[list[int], list[float]] | None:
-    """Rows and Lagrange weights of the observations around t, or None across a gap."""
-    for k in (after - 1, after):
-        if abs(times[k] - t) < SAME_INSTANT_S:
-            return [k], [1.0]
-    a, b = after - 1, after
-    if not times[a] < t < times[b] or times[b] - times[a] > gap:
-        return None
-    first = min(max(a - 1, 0), max(times.size - 4, 0))
-    rows = list(range(first, min(first + 4, times.size)))
-    if np.diff(times[rows]).max() > gap:
-        rows = [a, b]
-    nodes = times[rows]
-    weights = [
-        float(np.prod((t - np.delete(nodes, j)) / (nodes[j] - np.delete(nodes, j))))
-        for j in range(len(rows))
-    ]
-    return rows, weights
+def _neighbours(times: Floats, t_s: Floats, gap: float) -> tuple[Ints, Floats]:
+    """Rows and Lagrange weights (N, 4) of the observations around each t; zeros across a gap."""
+    after = np.clip(np.searchsorted(times, t_s), 1, times.size - 1)
+    pair = np.stack([after - 1, after], axis=1)
+    last = max(times.size - 4, 0)
+    four = np.clip(after - 2, 0, last)[:, None] + np.arange(min(4, times.size))
+    whole = np.diff(times[four], axis=1).max(axis=1) <= gap
+    inside = (times[pair[:, 0]] < t_s) & (t_s < times[pair[:, 1]])
+    inside &= np.diff(times[pair], axis=1)[:, 0] <= gap
+    rows, weight = np.zeros((t_s.size, 4), np.int64), np.zeros((t_s.size, 4))
+    for chosen, nodes in ((inside & whole, four), (inside & ~whole, pair)):
+        k = nodes.shape[1]
+        rows[chosen, :k] = nodes[chosen]
+        weight[chosen, :k] = _lagrange(times[nodes[chosen]], t_s[chosen])
+    for k in (1, 0):
+        same = np.abs(times[pair[:, k]] - t_s) < SAME_INSTANT_S
+        rows[same] = pair[same, k, None]
+        weight[same] = [1.0, 0.0, 0.0, 0.0]
+    return rows, weight
+
+
+def _lagrange(nodes: Floats, t_s: Floats) -> Floats:
+    """Weights (N, K) of the polynomial through K nodes (N, K) at t (N,)."""
+    k = nodes.shape[1]
+    away = ~np.eye(k, dtype=np.bool_)
+    top = np.where(away, (t_s[:, None] - nodes)[:, None, :], 1.0)
+    bottom = np.where(away, nodes[:, :, None] - nodes[:, None, :], 1.0)
+    out: Floats = np.prod(top / bottom, axis=2)
+    return out
 
 
 def _take(track: Track, pick: Ints, weight: Floats, good: Bools) -> View:
