@@ -45,7 +45,7 @@ def test_a_marker_needs_a_size():
 
 @pytest.mark.parametrize("tilt", [0.0, 40.0])
 def test_a_bent_marker_is_reported_as_rendered_pictures_show(tilt):
-    """75 m/s² and 0.5 m/s while rows of 28 µs go over the marker: corners miss by several 0.001 px."""
+    """75 m/s² and 0.5 m/s while rows of 28 µs pass: corners miss by several 0.001 px."""
     size_mm, place = 70.0, np.array([-40.0, 20.0, 1400.0])
     cam = camera(row_time_s=2.8e-5)
     middle = 2.8e-5 * cam.project(place[None])[0, 1]
