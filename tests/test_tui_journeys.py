@@ -23,6 +23,7 @@ from olivevib.tui.screens.results import ResultsPage
 from olivevib.tui.screens.trial import TrialPage
 from olivevib.tui.screens.trials import TrialsPage
 from olivevib.tui.themes import DARK, SUNLIGHT
+from olivevib.tui.views.folder import bytes_words
 from olivevib.tui.widgets.picture import Picture
 from olivevib.tui.work import Result, Work
 
@@ -59,7 +60,14 @@ async def test_from_the_list_to_results_report_and_back_by_keys(workspace):
         assert isinstance(app.screen, ResultsPage)
         await press(pilot, "escape", "e")
         assert isinstance(app.screen, ReportPage)
-        await press(pilot, "down", "enter")
+        await press(pilot, "down", "down", "down")
+        contents = words(app, "#preview")
+        assert "time_s, marker, x_mm" in contents
+        assert "marker 9 12 times in 1 stretch" in contents
+        said = contents.split(" · ")[1].split("\n")[0]
+        await press(pilot, "enter")
+        size = (workspace / "trials/2026-11-20_T04/exports/2026-11-20_T04.csv").stat().st_size
+        assert bytes_words(size) == said  # the preview told the size of what is written
         assert (workspace / "trials/2026-11-20_T04/exports/2026-11-20_T04.csv").is_file()
         assert "made" in screen_text(app)
         await press(pilot, "escape", "escape")
@@ -69,8 +77,9 @@ async def test_from_the_list_to_results_report_and_back_by_keys(workspace):
 @pytest.mark.slow
 async def test_the_report_is_made_and_its_place_shown(workspace):
     async with started(workspace, (80, 24)) as (app, pilot):
-        await press(pilot, "enter", "e", "e")
+        await press(pilot, "enter", "e", "p")
         page = workspace / "trials/2026-11-20_T04/report.html"
+        assert page.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
         assert page.read_text(encoding="utf-8").lower().startswith("<!doctype html>")
         assert "Made: trials/2026-11-20_T04/report.html" in screen_text(app)
 
@@ -121,8 +130,8 @@ class Endless:
 
 
 def told(app) -> str:
-    """What the toasts say."""
-    return " ".join(n.message for n in app._notifications)
+    """The outcome of the last work."""
+    return app.said.words if app.said else ""
 
 
 def words(app, selector: str) -> str:
@@ -151,6 +160,31 @@ async def test_escape_cancels_and_says_that_work_is_kept(workspace):
         assert "Cancelled; finished work is kept" in told(app)
         await press(pilot, "escape")
         assert isinstance(app.screen, TrialsPage)
+
+
+async def test_the_table_of_stages_follows_the_work(workspace):
+    folder = workspace / "trials/2026-11-20_T04"
+    (folder / "comparison.h5").rename(folder / "away")
+    (folder / "vibration.h5").rename(folder / "too")
+    endless = Endless()
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter")
+        table = app.screen.query_one("#stages", DataTable)
+
+        def states() -> list[str]:
+            return [str(table.get_cell_at((k, 1))) for k in (2, 3, 4)]
+
+        app.start(Work("2026-11-20_T04: run", endless))
+        await running(pilot, endless)
+        await pilot.pause(0.1)
+        assert states() == ["● done", "▶ running", "○ missing"]
+        (folder / "too").rename(folder / "vibration.h5")  # as the work would
+        while states()[1] != "● done":
+            await pilot.pause(0.05)
+        assert states() == ["● done", "● done", "▶ running"]
+        app.action_cancel_work()
+        await settle(pilot)
+        assert states()[2] == "○ missing"
 
 
 async def test_one_work_at_a_time_and_screens_stay_usable(workspace):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import tui_scene as scene
 from rich.cells import cell_len
 from tui_app import lines
 
+from olivevib.pipeline.export_preview import ExportPreview, Gap
 from olivevib.tui.views.axes import Frame
 from olivevib.tui.views.cells import Cells, braille_values, polyline, scatter
 from olivevib.tui.views.motion import MotionPlot, motion_plot, window
@@ -21,7 +24,7 @@ from olivevib.tui.views.of_results import (
     spectrum_of,
 )
 from olivevib.tui.views.orbits import PLANES, Orbit, mm_per_dot, orbit_at, orbits_plot, page_of
-from olivevib.tui.views.outputs import Output, extent_words, preview_text
+from olivevib.tui.views.outputs import Output, gap_words, preview_text
 from olivevib.tui.views.palette import Palette
 from olivevib.tui.views.picture import Outline, Window, fitting, picture
 from olivevib.tui.views.progress import ESCAPE, Progress, progress_line
@@ -395,9 +398,14 @@ def test_a_comparison_is_told_with_sigmas():
     assert "12.000 Hz: camera 22.700 ± 0.200, sensor 22.600 ± 0.100 m/s²" in told
 
 
-def test_outputs_say_what_and_where():
-    told = preview_text(Output("csv", "exports/T04.csv", "not made"), "4 markers.", PLAIN).plain
-    assert told.startswith("Enter writes exports/T04.csv")
-    again = preview_text(Output("csv", "exports/T04.csv", "made"), "", PLAIN).plain
+def test_outputs_say_what_where_and_what_is_missing_in_them():
+    gap = Gap(9, 12, 1, 0.433)
+    found = ExportPreview(123_456, ("time_s,marker",), 240, (1, 9), 7.97, "left camera", (gap,))
+    told = preview_text(Output("csv", "exports/T04.csv", "not made"), found, PLAIN).plain
+    assert told.startswith("Enter writes exports/T04.csv · 123 kB")
+    for part in ("markers 1, 9; 240 times over 7.97 s", "sigma_z_mm, state", "left camera"):
+        assert part in told
+    assert "marker 9 12 times in 1 stretch (longest 0.43 s); the others have none" in told
+    again = preview_text(Output("pdf", "report.pdf", "made"), None, PLAIN).plain
     assert "Enter writes it again" in again
-    assert "only the report" in extent_words(0, 0, 0.0, "")
+    assert "none: every marker" in gap_words(replace(found, gaps=()))

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.cells import cell_len
+from small_videos import make_video
 
 from olivevib.errors import InputError, UsageError
 from olivevib.progress import Cancelled
@@ -20,6 +21,7 @@ from olivevib.tui.app import OlivevibApp
 from olivevib.tui.harmless import REPLACEMENT, harmless, plain
 from olivevib.tui.kept import Kept, place_of, read_kept, write_kept
 from olivevib.tui.loader import TrialRow
+from olivevib.tui.look import look_at
 from olivevib.tui.plan import FIELDS, guesses, plan_of, trial_name
 from olivevib.tui.screens.error import error_text
 from olivevib.tui.themes import palette_of
@@ -225,20 +227,35 @@ def test_the_form_becomes_a_plan():
 
 
 @pytest.mark.parametrize(
-    ("values", "words"),
+    ("field", "text", "words"),
     [
-        ({"right": "b"}, "left recording"),
-        ({"size": "wide"}, "no number"),
-        ({"shutter": "fast"}, "shutter"),
-        ({"ids": "1,x"}, "no list of ids"),
-        ({"band": "45-5"}, "no band"),
-        ({"accelerometer_marker": "1.5"}, "no id"),
+        ("left", "", "“left recording”: the left recording is not named"),
+        ("left", "gone.avi", "“left recording”: gone.avi is missing"),
+        ("size", "wide", "“marker size, mm”: 'wide' is no number"),
+        ("size", "-1", "“marker size, mm” -1.0 is no size"),
+        ("shutter", "fast", "“shutter”: 'fast' is not known"),
+        ("ids", "1,x", "“marker ids”: '1,x' cannot be read"),
+        ("band", "45-5", "“band, Hz”: '45-5' cannot be read"),
+        ("row_time", "a", "“row time, µs”: 'a' cannot be read"),
+        ("exposure", "0", "“exposure, ms” 0 is no exposure"),
+        ("board", "coded:", "“board”"),
+        ("markers", "aruco:NONE", "“marker library”"),
+        ("calibration_left", "stills", "“right board”: only one side"),
+        ("accelerometer_marker", "1.5", "“its marker”: '1.5' is no id"),
+        ("accelerometer_marker", "900", "“its marker”: the accelerometer's marker 900 is none"),
     ],
 )
-def test_a_wrong_field_is_named(values, words):
-    full = {"left": "a", "right": "b"} | values if "right" not in values else values
-    with pytest.raises(UsageError, match=words):
-        plan_of(full)
+def test_a_fault_names_its_line_in_the_words_of_the_form(field, text, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for side in ("left", "right"):
+        make_video(tmp_path / f"{side}.avi", frames=2)
+    values = {"trial": "T01", "left": "left.avi", "right": "right.avi", field: text}
+    looked = look_at(values, whole=True)
+    assert looked.error is not None
+    assert words in str(looked.error)
+    assert "--" not in str(looked.error)
+    assert "trial.toml" not in str(looked.error)
+    assert looked.field == ("calibration_right" if field == "calibration_left" else field)
 
 
 @pytest.mark.parametrize("name", ["", "  ", "..", "a/b", "a\\b", "a:b"])

@@ -16,7 +16,7 @@ KEYS = (
     *("text:aruco:DICT_4X4_50", "enter", "text:global", "enter", "enter", "text:2", "enter"),
     *("text:5-14", "enter"),
     *("enter", "text:2", "ctrl+s", WAIT, "r", WAIT),
-    *("v", "escape", "c", "escape", "e", "e", WAIT, *["down"] * 4, "enter", WAIT),
+    *("v", "escape", "c", "escape", "e", "e", WAIT, *["down"] * 6, "enter", WAIT),
 )
 MOST = 40
 

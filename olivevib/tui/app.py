@@ -11,7 +11,6 @@ from textual import work
 from textual.app import App
 from textual.binding import Binding, BindingType
 from textual.command import Provider
-from textual.notifications import SeverityLevel
 from textual.reactive import reactive
 from textual.screen import Screen
 
@@ -28,9 +27,7 @@ from olivevib.tui.screens.trials import TrialsPage
 from olivevib.tui.themes import DARK, SUNLIGHT, THEMES, palette_of
 from olivevib.tui.views.palette import Palette
 from olivevib.tui.views.progress import Progress
-from olivevib.tui.work import Ended, PostedTick, Work, perform
-
-TOAST_S = 8.0
+from olivevib.tui.work import Ended, PostedTick, Said, Work, perform
 
 
 class OlivevibApp(App[None]):
@@ -50,6 +47,7 @@ class OlivevibApp(App[None]):
 
     progress: reactive[Progress | None] = reactive(None)
     cancelling: reactive[bool] = reactive(False)
+    said: reactive[Said | None] = reactive(None)  # how the last work ended, with the next key
     revision: reactive[int] = reactive(0)  # counts what work has changed on the disk
 
     def __init__(self, workspace: Path) -> None:
@@ -145,7 +143,7 @@ class OlivevibApp(App[None]):
         """Do long work in a thread; one at a time."""
         if self.is_free():
             self._cancel.clear()
-            self.cancelling = False
+            self.cancelling, self.said = False, None
             self.progress = Progress(job.title, "starting", 0, None)
             self._perform(job)
 
@@ -173,13 +171,16 @@ class OlivevibApp(App[None]):
             self.show_error(ended.error)
         elif ended.cancelled:
             words = "Cancelled; finished work is kept. The same key goes on from there."
-            self.notify(words, timeout=TOAST_S, markup=False)
+            self.say(words)
         elif ended.result is not None:
             words, warned = ended.result.words, bool(ended.result.cautions)
-            severity: SeverityLevel = "warning" if warned else "information"
-            self.notify(words, severity=severity, timeout=TOAST_S, markup=False)
+            self.say(words, warned)
             if ended.result.opens is not None:
                 self.open(ended.result.opens)
+
+    def say(self, words: str, warned: bool = False) -> None:
+        """Say an outcome on the line of work of every screen, where it covers nothing."""
+        self.said = Said(words, warned)
 
     def action_cancel_work(self) -> None:
         """Ask the work to stop at its next step."""

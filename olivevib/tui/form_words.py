@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from olivevib.errors import OlivevibError, UsageError
 from olivevib.tui.plan import FORM_NAMES, Field
 
-_UNITS = r"(?: (?:FILE|PATH|SPEC|MM|US|MS|LIB|ID|DEVICE|NAME|HZ|\d[\d.,-]*))?"
+_UNITS = r"(?: (?:FILE|PATH|SPEC|MM|US|MS|LIB|ID|DEVICE|NAME|HZ|\d[\d.,-]*(?=[):;])))?"
 _OPTION = re.compile(rf"--([a-z][a-z-]*){_UNITS}")
 _PLAIN = (
     (re.compile(r"; olivevib \w+ --help lists them"), "; Ctrl+O in that line lists them"),

@@ -65,15 +65,19 @@ def preview_board(folder: Path, show: Callable[[Guidance], None]) -> Work:
     return Work(f"{_name(folder)}: board", do)
 
 
-def make_report(folder: Path) -> Work:
-    """One self-contained page beside the trial."""
+def make_report(folder: Path, kind: str = "report") -> Work:
+    """One self-contained page beside the trial; "pdf" and "figures" come with the page."""
 
     def do(tick: Tick) -> Result:
         from olivevib import pipeline
+        from olivevib.report import Also
         from olivevib.trial import Trial
 
-        page = next(iter(pipeline.report([Trial.open(folder)], None, tick)))
-        return Result(f"The report is {harmless(page)}")
+        also = Also(pdf=kind == "pdf", figures=kind == "figures")
+        pages = list(pipeline.report([Trial.open(folder)], None, tick, also))
+        made = next((p for p in pages if p.suffix == ".pdf"), pages[0])
+        more = f", and {len(pages) - 1} figures" if kind == "figures" else ""
+        return Result(f"The report is {harmless(made)}{more}")
 
     return Work(f"{_name(folder)}: report", do)
 

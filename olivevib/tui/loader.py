@@ -5,7 +5,8 @@ Everything heavy is imported inside: the first picture of the app waits for none
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from olivevib.comparison import Comparison
     from olivevib.detection import DetectionSettings
     from olivevib.geometry import StereoRig
+    from olivevib.pipeline.export_preview import ExportPreview
     from olivevib.reconstruction import Trajectory
     from olivevib.trial import Trial
     from olivevib.trial.quality import StageLine
@@ -284,6 +286,24 @@ def form_values(workspace: Path, like: Path | None) -> FormValues:
 def _made_ns(folder: Path) -> int:
     """When trial.toml was last written."""
     return (folder / "trial.toml").stat().st_mtime_ns
+
+
+def export_contents(folder: Path, kind: str) -> ExportPreview:
+    """What an export of the trial will hold; raises as ``pipeline.export`` does."""
+    from olivevib.pipeline.export_preview import export_preview
+    from olivevib.trial import Trial
+
+    return export_preview(Trial.open(folder), kind)
+
+
+def result_stamps(folders: Iterable[Path]) -> tuple[tuple[str, int], ...]:
+    """When each result of these trials was written: what shows that a stage has ended."""
+    found = []
+    for folder in folders:
+        for path in (*folder.glob("*.h5"), folder / "rig.toml"):
+            with suppress(OSError):
+                found.append((str(path), path.stat().st_mtime_ns))
+    return tuple(sorted(found))
 
 
 def settings_now(folder: Path) -> DetectionSettings:

@@ -26,6 +26,14 @@ class Result:
 
 
 @dataclass(frozen=True)
+class Said:
+    """An outcome in words; warned: it has warnings to read."""
+
+    words: str
+    warned: bool = False
+
+
+@dataclass(frozen=True)
 class Work:
     """Something long to do: its title, and the function that does it with a tick."""
 

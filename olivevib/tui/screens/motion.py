@@ -102,7 +102,7 @@ class MotionPage(TimePage):
     def _save_phases(self, rows: list[Row]) -> None:
         self.save_settings({"vibration.phases": [list(row) for row in rows] or None})
         words = "Phases are written; Esc, then r analyses anew."
-        self.notify(words, markup=False)
+        self.olive.say(words)
 
     def action_page(self, name: str) -> None:
         """Show another page of this trial."""

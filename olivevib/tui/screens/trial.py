@@ -14,13 +14,14 @@ from textual.coordinate import Coordinate
 from textual.widgets import DataTable, Static
 
 from olivevib.tui import jobs
-from olivevib.tui.harmless import plain
-from olivevib.tui.loader import STAGE_NAMES, TrialFacts, trial_facts
+from olivevib.tui.harmless import harmless, plain
+from olivevib.tui.loader import STAGE_NAMES, TrialFacts, result_stamps, trial_facts
 from olivevib.tui.screens.edit import EditScreen
 from olivevib.tui.screens.error import error_text
 from olivevib.tui.screens.page import Command, Help, Jump, Page
 from olivevib.tui.widgets.title import Title
 
+LOOK_S = 0.5  # how often the results are looked at while work runs
 FOUND_ON = {
     "calibrate": "calibration",
     "track": "pictures",
@@ -68,6 +69,9 @@ class TrialPage(Page):
         Binding("x", "check", "Check every file", show=False),
     ]
 
+    _stamps: tuple[tuple[str, int], ...] = ()
+    _marked = ""  # the stage that is shown as running
+
     def body(self) -> ComposeResult:
         """Stages above, warnings and facts below."""
         yield DataTable(id="stages", classes="pane", cursor_type="row")
@@ -86,6 +90,31 @@ class TrialPage(Page):
         for name in STAGE_NAMES:
             table.add_row(name, "…", "")
         table.focus()
+        self.set_interval(LOOK_S, self._follow_files)
+        self.watch(self.app, "progress", self._follow_work, init=False)
+
+    def _follow_files(self) -> None:
+        """Read again when a stage of the work that runs has written its result."""
+        if self.olive.progress is not None:
+            stamps = result_stamps([self.folder])
+            if stamps != self._stamps:
+                self._stamps = stamps
+                self.reload()
+
+    def _follow_work(self) -> None:
+        """Mark the stage that is at work."""
+        facts = getattr(self, "_facts", None)
+        if facts is not None and self._at_work(facts) != self._marked:
+            self._show_stages(facts)
+
+    def _at_work(self, facts: TrialFacts) -> str:
+        """The stage that is at work on this trial; "" for none."""
+        progress, name = self.olive.progress, harmless(self.folder.resolve().name, 40)
+        if progress is None or not progress.title.startswith(f"{name}: "):
+            return ""
+        verb = progress.title.removeprefix(f"{name}: ")
+        to_do = (s.name for s in facts.stages if s.state not in ("done", "skipped"))
+        return next(to_do, "") if verb == "run" else verb
 
     def read(self) -> TrialFacts:
         """Summary and settings from the files."""
@@ -121,11 +150,13 @@ class TrialPage(Page):
         from olivevib.tui.views.tables import state_cell
 
         table = self.query_one("#stages", DataTable)
+        self._marked = self._at_work(facts)
         for at, stage in enumerate(facts.stages):
             reason = stage.reason
             if stage.name == "track" and facts.resume and stage.state != "done":
                 reason = f"{reason}; {facts.resume}"
-            state = state_cell(stage.state, self.olive.palette)
+            running = stage.name == self._marked
+            state = state_cell("running" if running else stage.state, self.olive.palette)
             table.update_cell_at(Coordinate(at, 1), state, update_width=True)
             table.update_cell_at(Coordinate(at, 2), plain(reason, 160), update_width=True)
 

@@ -108,7 +108,7 @@ class TuningPage(Page):
         """Write the parameters into trial.toml; what depends on them becomes stale."""
         if self.tried is not None:
             self.save_settings(changes_of(self.tried))
-            self.notify("The parameters are in trial.toml; t tracks with them.", markup=False)
+            self.olive.say("The parameters are in trial.toml; t tracks with them.")
 
     def action_run(self, stage: str) -> None:
         """Run a stage: TRACK or STEREO 3D of the paper."""

@@ -15,6 +15,7 @@ GLYPHS = {
     "failed": "✗",
     "blocked": "□",
     "skipped": "–",
+    "running": "▶",
 }
 DECIDED = ("direct", "confirmed", "supported")
 CANDIDATES_SHOWN = 5
