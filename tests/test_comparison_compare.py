@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from olivevib.comparison import ComparisonSettings, Verdict, compare
+from olivevib.comparison import ComparisonSettings, Verdict, View, compare
 from olivevib.comparison.fit import Seen, _jacobian, fit_clock, procrustes
 from olivevib.comparison.forward import nuisance, sensor_motion
 from olivevib.signals import Samples
@@ -106,6 +106,59 @@ def test_a_steady_record_leaves_the_lag_open_but_not_the_gain():
     assert "ambiguous" in c.reason
     assert np.isnan(c.clock_offset_sigma_s) or c.clock_offset_sigma_s > 0.01
     assert c.gain == pytest.approx(1.0, abs=0.01)
+
+
+def fitted_at_one_frequency(seed):
+    """A path as the fit in continuous time gives it (steady phase only), and both cameras' rows."""
+    shaker, logger = Shaker(harmonic=0.0), Logger(offset_s=3.7)
+    rng = np.random.default_rng(seed)
+    t, path = truth(shaker, rng, rate_hz=8000.0)
+    turn = rotation(rng)
+    start, end = shaker.limits[1], shaker.limits[2]
+    optical = camera(t, path, rng, np.arange(start + 0.2, end - 0.2, 1 / 240), 0.02)
+    views = []
+    for late, px_per_mm in (
+        (0.0, [[0.6, 0, -0.1], [0, 0.6, 0]]),
+        (0.013, [[0.6, 0, 0.1], [0, 0.6, 0]]),
+    ):
+        times = np.arange(late, shaker.limits[-1], 1 / 30)
+        mm = camera(t, path, rng, times, 0.0, EXPOSURE, shaker).values
+        px = 300 + mm @ np.array(px_per_mm).T + 0.03 * rng.normal(size=(times.size, 2))
+        views.append(View(times, px, np.array(px_per_mm), EXPOSURE))
+    return optical, sensor(t, path, rng, logger, turn), turn, tuple(views)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_rows_of_each_camera_decide_between_lags_that_a_fitted_path_leaves_open(seed):
+    optical, accelerometer, turn, views = fitted_at_one_frequency(seed)
+    near = ComparisonSettings(expected_offset_s=3.6)
+    alone = compare(optical, accelerometer, 1, "trunk", near, views=())
+    assert alone.ambiguous
+    assert alone.verdict is Verdict.UNDECIDED
+    assert alone.reason.startswith("Amplitudes only")
+    c = compare(optical, accelerometer, 1, "trunk", views=views)
+    assert c.verdict is Verdict.AGREES
+    assert not c.ambiguous
+    assert "each camera saw" in c.reason
+    middle = (c.overlay_t_s[0] + c.overlay_t_s[-1]) / 2
+    offset = 3.7 + 30e-6 * (middle - LOGGER.t_mid_s)
+    assert abs(c.clock_offset_s - offset) < 4 * c.clock_offset_sigma_s
+    assert abs(c.clock_drift_ppm - 30) < 4 * c.clock_drift_sigma_ppm
+    assert abs(c.gain - 1) < 4 * c.gain_sigma
+    assert c.clock_offset_sigma_s < 3e-5
+    assert angle_deg(c.R_camera_sensor @ turn.T) < 1.0
+
+
+def test_what_the_cameras_saw_decides_nothing_where_it_is_not_the_sensors_motion():
+    """Chi-square alone would choose a lag: the guard is how much of the pictures it explains."""
+    optical, accelerometer, _, views = fitted_at_one_frequency(3)
+    rng = np.random.default_rng(5)
+    other = tuple(
+        View(v.t_s, v.px + 3 * rng.normal(size=v.px.shape), v.px_per_mm, EXPOSURE) for v in views
+    )
+    c = compare(optical, accelerometer, 1, "trunk", views=other)
+    assert c.ambiguous
+    assert c.verdict is Verdict.UNDECIDED
 
 
 def test_straight_motion_leaves_the_turn_about_it_open():

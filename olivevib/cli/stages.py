@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from olivevib import values
 from olivevib.cli.console import Console
+from olivevib.values import counted
 
 if TYPE_CHECKING:
+    from olivevib.errors import Caution
     from olivevib.trial import Trial
 
 PAPER_KEYS: dict[str, dict[str, object]] = {
@@ -51,18 +52,24 @@ def run(arguments: argparse.Namespace, console: Console) -> int:
     for name in arguments.trials:
         trial = _open(name, changes, console)
         console.say(f"{trial.name}")
+        told: set[Caution] = set()
         for outcome in pipeline.run(trial, console.tick):
             console.say(f"  {outcome.stage}: {outcome.words}")
-            warned += console.cautions(outcome.cautions)
+            console.cautions(outcome.cautions)
+            told.update(outcome.cautions)
+        standing = trial.reopen().cautions  # also those of stages that were up to date
+        warned += len(standing) + len(told)
+        kept = [caution for caution in standing if caution not in told]
+        if kept:
+            console.say(f"  {counted(len(kept), 'warning')} of earlier runs: olivevib show {name}")
         console.say(f"Next: olivevib show {name}   or   olivevib report {name}")
     return 3 if warned else 0
 
 
 def _open(name: str, changes: dict[str, object], console: Console) -> Trial:
-    from olivevib.trial import Trial
-    from olivevib.trial.workspace import find_trial
+    from olivevib.cli.trials import trial_of
 
-    trial = Trial.open(find_trial(name, Path()))
+    trial = trial_of(name, console)
     if changes:
         trial = trial.changed(changes)
         told = ", ".join(f"{key} = {value}" for key, value in changes.items())

@@ -3,5 +3,6 @@
 from olivevib.comparison.compare import compare
 from olivevib.comparison.settings import ComparisonSettings
 from olivevib.comparison.types import Comparison, LineDifference, Verdict
+from olivevib.comparison.views import View
 
-__all__ = ["Comparison", "ComparisonSettings", "LineDifference", "Verdict", "compare"]
+__all__ = ["Comparison", "ComparisonSettings", "LineDifference", "Verdict", "View", "compare"]

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from olivevib.arrays import Floats
-from olivevib.comparison.fit import ClockFit, Seen, fit_clock
+from olivevib.comparison.fit import ClockFit, Seen, evaluated, fit_clock
 from olivevib.comparison.forward import Nuisance, SensorMotion, nuisance, sensor_motion
 from olivevib.comparison.lag import CoarseLag, envelope_offset, fine_lag, offsets_that_overlap
 from olivevib.comparison.lines import line_differences, sensor_lines, steady_limits
 from olivevib.comparison.noise import with_local_noise
+from olivevib.comparison.rival import CLOSE, Rival, angle_deg, borne_out_by, coherence_of, rival_of
 from olivevib.comparison.settings import DEFAULTS, ComparisonSettings
 from olivevib.comparison.types import Comparison, LineDifference, Verdict
-from olivevib.geometry import vector_from_rotation
+from olivevib.comparison.views import View, fit_views
 from olivevib.progress import Tick, silent
 from olivevib.signals import Samples
 from olivevib.vibration.clock import between, measured
@@ -24,9 +25,6 @@ from olivevib.vibration.verdict import fold
 _FEWEST = 30
 _NARROWEST_HZ = 0.3
 _RESEMBLES = 0.8  # correlation below which the two motions are not called the same
-_CLOSE = 0.05  # a rival lag whose correlation comes that near is told
-_NOISE_ONLY = 0.95  # coherence below which what is left is more than noise: chi-square cannot tell
-_DECISIVE = 25.0  # chi-square by which the best lag must beat the rival to be sure
 _OPEN_DEG = 8.0  # sigma of the turn from which what is seen across may be noise
 _OPEN_RAD = 1.0  # sigma of a turn that nothing fixes
 _LEAST_LEFT = 0.005  # of the motion's power that taking out the slow part must leave
@@ -40,13 +38,16 @@ def compare(
     sensor_name: str,
     settings: ComparisonSettings = DEFAULTS,
     tick: Tick = silent,
+    views: tuple[View, ...] | None = None,
 ) -> Comparison:
     """Compare the displacement (mm, at mid-exposure) of a marker with a sensor (m/s2).
 
     The sensor's acceleration predicts what the camera must have seen at each of its own instants,
     so lines above half the frame rate compare as well; nothing is claimed about aliases of the
     camera alone. clock_offset_s is the sensor's stamp minus the trial clock, at the middle of the
-    common record. Raises ValueError for other units.
+    common record. views: where the path is one that was fitted at one frequency, the marker in each
+    camera at the times of its own rows; lag, clock, gain and turn are then told by these. Raises
+    ValueError for other units.
     """
     if optical.unit != "mm" or len(optical.axes) != 3:
         raise ValueError(f"marker {marker}: need three axes in mm, got {optical.unit}")
@@ -63,15 +64,19 @@ def compare(
     tick(1, 4, "lines of the accelerometer")
     lines = sensor_lines(sensor, 1.5 * settings.corner_hz)
     tick(2, 4, "lag between the clocks")
-    work = _Work(camera_s, camera_mm, motion, lines, settings, missing)
+    work = _Work(camera_s, camera_mm, motion, lines, settings, missing, views)
     lag = work.coarse(limits)
+    lag, borne_out = work.borne_out(lag)
     tick(3, 4, "clock, gain and rotation")
     seen, clock = work.refined(lag.offset_s)
     if seen.t_s.size < _FEWEST:
         return empty.undecided("Too few frames lie inside the accelerometer's record.")
-    if lines.fit is not None:
-        clock = with_local_noise(seen, clock, float(lines.fit.f_hz[0]))
-    return _comparison(empty, work, lag, seen, clock, work.differences(sensor, clock))
+    if views:
+        clock = work.by_views(seen, clock)
+    elif lines.fit is not None:
+        clock = with_local_noise(seen, clock, work.line_hz)
+    rival = rival_of(work.refined, lag, clock, seen.mm, borne_out)
+    return _comparison(empty, work, lag, seen, clock, rival, work.differences(sensor, clock))
 
 
 def _axes_that_are(sensor: Samples) -> tuple[Samples, int]:
@@ -92,6 +97,7 @@ class _Work:
     lines: LineFit
     settings: ComparisonSettings
     missing_axes: int
+    views: tuple[View, ...] | None  # of a fitted path
 
     @property
     def rate_hz(self) -> float:
@@ -132,7 +138,10 @@ class _Work:
         """The best lag: envelopes where they are lively, else about the expected offset."""
         s = self.settings
         wide = 1.5 * s.corner_hz
-        middle = envelope_offset(self.camera_s, self.camera_mm, self.motion, limits, wide)
+        seen_s, moved = self.camera_s, self.camera_mm
+        if self.views:  # they saw the start of the machine, too
+            seen_s, moved = self.views[0].t_s, self.views[0].px
+        middle = envelope_offset(seen_s, moved, self.motion, limits, wide)
         level = middle is None
         if middle is None:
             middle = float(np.clip(s.expected_offset_s, *limits))
@@ -141,6 +150,33 @@ class _Work:
         slow = nuisance(self.camera_s, self.slow_hz(middle))
         seen = Seen(self.camera_s, slow.out(self.camera_mm), slow, s.exposure_s)
         return fine_lag(seen, self.motion, offsets, self.apart_s, level)
+
+    @property
+    def line_hz(self) -> float:
+        """The sensor's dominant line; NaN: none."""
+        return np.nan if self.lines.fit is None else float(self.lines.fit.f_hz[0])
+
+    def borne_out(self, lag: CoarseLag) -> tuple[CoarseLag, bool | None]:
+        """The lag that the cameras' own rows bear out, and whether they exclude all others.
+
+        None: the path is no fitted one and tells by itself.
+        """
+        if self.views is None:
+            return lag, None
+        slow_hz = 1.5 * self.settings.corner_hz
+        return borne_out_by(self.views, self.motion, lag, self.refined, slow_hz, self.line_hz)
+
+    def by_views(self, seen: Seen, clock: ClockFit) -> ClockFit:
+        """The clock that the cameras' own rows tell, and what it leaves of the path."""
+        slow_hz = 1.5 * self.settings.corner_hz
+        told = fit_views(self.views or (), self.motion, clock, slow_hz, self.line_hz)
+        if told is None:
+            return clock
+        path = evaluated(
+            seen, self.motion, told.offset_s, told.drift, told.gain, told.R_camera_sensor
+        )
+        noise = np.sqrt(np.mean(path.residual_mm**2, axis=0))
+        return replace(path, covariance=told.covariance, noise_mm=noise)
 
     def differences(self, sensor: Samples, clock: ClockFit) -> tuple[LineDifference, ...]:
         """Line by line over the steady phase, or over all that both saw."""
@@ -227,66 +263,24 @@ class _Outcome:
         )
 
 
-@dataclass(frozen=True)
-class _Rival:
-    """The best other lag: whether it is near enough to tell, and whether it is excluded.
-
-    scatter_s: how far apart the lags lie that fit alike; NaN where they go on without end.
-    """
-
-    near: bool
-    excluded: bool
-    distance_s: float
-    scatter_s: float
-    offset_s: float = np.nan
-    turn_deg: float = np.nan
-
-    @property
-    def open(self) -> bool:
-        """Both lags remain."""
-        return self.near and not self.excluded
-
-
-def _rival(work: _Work, lag: CoarseLag, clock: ClockFit, seen_mm: Floats) -> _Rival:
-    if not np.isfinite(lag.rival_s) or lag.peak - lag.second_peak >= _CLOSE:
-        return _Rival(False, True, 0.0, 0.0)
-    _, other = work.refined(lag.rival_s)
-    distance = abs(lag.rival_s - lag.offset_s)
-    noise = np.maximum(clock.noise_mm, 1e-12)
-    excluded = False
-    if np.isfinite(other.gain):  # the two may share all frames but a few at the ends
-        now, then = (np.mean((c.residual_mm / noise) ** 2) for c in (clock, other))
-        frames = min(len(clock.residual_mm), len(other.residual_mm))
-        excluded = bool(3 * frames * (then - now) > _DECISIVE)
-        excluded &= _coherence(seen_mm, clock.residual_mm) > _NOISE_ONLY
-        distance = abs(other.offset_s - clock.offset_s)
-    turn = _angle_deg(other.R_camera_sensor @ clock.R_camera_sensor.T)
-    scatter = np.nan if lag.level else max(distance, lag.scatter_s)
-    return _Rival(True, excluded, distance, scatter, lag.rival_s, turn)
-
-
-def _angle_deg(R: Floats) -> float:
-    if not np.isfinite(R).all():
-        return np.nan
-    return float(np.degrees(np.linalg.norm(vector_from_rotation(R))))
-
-
 def _comparison(
     empty: _Outcome,
     work: _Work,
     lag: CoarseLag,
     seen: Seen,
     clock: ClockFit,
+    rival: Rival,
     lines: tuple[LineDifference, ...],
 ) -> Comparison:
-    rival = _rival(work, lag, clock, seen.mm)
     sigma = clock.sigma
     offset_sigma = float(np.hypot(sigma[0], 0.0 if rival.excluded else rival.scatter_s))
     straight = _is_straight(seen.mm, clock)
     worst_deg = float(np.degrees(_OPEN_RAD if straight else clock.turn_sigma_rad))
-    angle = _angle_deg(clock.R_camera_sensor)
-    coherence = _coherence(seen.mm, clock.residual_mm)
+    angle = angle_deg(clock.R_camera_sensor)
+    coherence = coherence_of(seen.mm, clock.residual_mm)
     verdict, reason = _verdict(work, lag, clock, coherence)
+    if rival.open and verdict is Verdict.AGREES:
+        verdict, reason = Verdict.UNDECIDED, f"Amplitudes only: {reason[0].lower()}{reason[1:]}"
     reasons = [reason, *_remarks(work, rival, clock, worst_deg)]
     return Comparison(
         marker=empty.marker,
@@ -328,11 +322,6 @@ def _is_straight(optical: Floats, clock: ClockFit) -> bool:
     return seen < 0.5 * clock.gain
 
 
-def _coherence(optical: Floats, residual: Floats) -> float:
-    total = float(np.sum(optical**2))
-    return float(np.clip(1 - np.sum(residual**2) / total, 0, 1)) if total > 0 else np.nan
-
-
 def _verdict(work: _Work, lag: CoarseLag, clock: ClockFit, coherence: float) -> tuple[Verdict, str]:
     r = float(np.sqrt(coherence)) if np.isfinite(coherence) else 0.0
     if work.missing_axes and r > 0.5:
@@ -342,7 +331,7 @@ def _verdict(work: _Work, lag: CoarseLag, clock: ClockFit, coherence: float) -> 
             "between its axes and the motion."
         )
     if r < _RESEMBLES:
-        if lag.peak - lag.second_peak < _CLOSE or r < 0.5:
+        if lag.peak - lag.second_peak < CLOSE or r < 0.5:
             return Verdict.UNDECIDED, (
                 f"No lag was found at which the two motions resemble one another (correlation "
                 f"{r:.2f}). Check that both belong to this trial and that the sensor sat at the "
@@ -364,7 +353,7 @@ def _verdict(work: _Work, lag: CoarseLag, clock: ClockFit, coherence: float) -> 
     )
 
 
-def _remarks(work: _Work, rival: _Rival, clock: ClockFit, worst_deg: float) -> list[str]:
+def _remarks(work: _Work, rival: Rival, clock: ClockFit, worst_deg: float) -> list[str]:
     out = []
     if rival.open:
         out.append(
@@ -375,7 +364,11 @@ def _remarks(work: _Work, rival: _Rival, clock: ClockFit, worst_deg: float) -> l
     elif rival.near:
         out.append(
             f"A lag {1e3 * rival.distance_s:.1f} ms away fits almost as well, but is excluded by "
-            "the whole record."
+            + (
+                "what each camera saw of the whole trial."
+                if rival.by_views
+                else "the whole record."
+            )
         )
     if worst_deg >= _OPEN_DEG:
         out.append("The motion is straight: the turn about it is left open.")

@@ -10,9 +10,9 @@ from olivevib.arrays import Floats
 from olivevib.comparison.forward import Nuisance, SensorMotion
 from olivevib.geometry import rotation_from_vector
 
-_STEPS = 12
-_STOP = np.array([1e-9, 1e-10, 1e-9, 1e-9, 1e-9, 1e-9])
-_LIMIT = np.array([2e-3, 1e-3, 0.3, 0.3, 0.3, 0.3])
+STEPS = 12
+STOP = np.array([1e-9, 1e-10, 1e-9, 1e-9, 1e-9, 1e-9])
+LIMIT = np.array([2e-3, 1e-3, 0.3, 0.3, 0.3, 0.3])
 _OPEN_RAD = 1.0  # prior on each turn about the start: what the motion leaves open stays open
 
 
@@ -94,16 +94,16 @@ def fit_clock(seen: Seen, motion: SensorMotion, offset_s: float) -> ClockFit:
     """Refine from an offset within a quarter period of the truth."""
     state = _start(seen, motion, offset_s)
     noise = np.sqrt(np.mean(state.residual_mm**2, axis=0))
-    for _ in range(_STEPS):
+    for _ in range(STEPS):
         jacobian = _jacobian(seen, motion, state)
-        step, _ = _solve(jacobian, state.residual_mm, _floored(noise))
-        step = np.clip(step, -_LIMIT, _LIMIT)
+        step, _ = _weighed(jacobian, state.residual_mm, _floored(noise))
+        step = np.clip(step, -LIMIT, LIMIT)
         state = _moved(seen, motion, state, step)
         freedom = max(1.0, seen.t_s.size - seen.slow.count - 2.0)
         noise = np.sqrt(np.sum(state.residual_mm**2, axis=0) / freedom)
-        if (np.abs(step) < _STOP).all():
+        if (np.abs(step) < STOP).all():
             break
-    _, covariance = _solve(_jacobian(seen, motion, state), state.residual_mm, _floored(noise))
+    _, covariance = _weighed(_jacobian(seen, motion, state), state.residual_mm, _floored(noise))
     return _with(state, covariance=covariance, noise_mm=noise)
 
 
@@ -115,12 +115,13 @@ def _floored(noise: Floats) -> Floats:
 def _start(seen: Seen, motion: SensorMotion, offset_s: float) -> ClockFit:
     predicted = seen.slow.out(motion.seen(seen.t_s + offset_s, seen.exposure_s))
     gain, rotation = procrustes(seen.mm, predicted)
-    return _evaluated(seen, motion, offset_s, 0.0, gain, rotation)
+    return evaluated(seen, motion, offset_s, 0.0, gain, rotation)
 
 
-def _evaluated(
+def evaluated(
     seen: Seen, motion: SensorMotion, offset_s: float, drift: float, gain: float, rotation: Floats
 ) -> ClockFit:
+    """The prediction and what it leaves at given clock, gain and turn; no covariance yet."""
     q = seen.t_s + offset_s + drift * (seen.t_s - seen.t_ref_s)
     predicted = seen.slow.out(motion.seen(q, seen.exposure_s)) @ rotation.T
     return ClockFit(
@@ -154,19 +155,22 @@ def _jacobian(seen: Seen, motion: SensorMotion, state: ClockFit) -> Floats:
     return np.stack([shift, stretch, state.predicted_mm, *turns], axis=2)
 
 
-def _solve(jacobian: Floats, residual: Floats, noise: Floats) -> tuple[Floats, Floats]:
-    """Step and covariance, each axis weighted by its noise, turns held by a weak prior."""
-    a = (jacobian / noise[:, None]).reshape(-1, 6)
-    b = (residual / noise).ravel()
+def _weighed(jacobian: Floats, residual: Floats, noise: Floats) -> tuple[Floats, Floats]:
+    """Step and covariance, each axis weighted by its noise."""
+    return solve((jacobian / noise[:, None]).reshape(-1, 6), (residual / noise).ravel())
+
+
+def solve(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Step (6,) and covariance (6, 6) of whitened rows a (K, 6), b (K,); a weak prior on turns."""
     normal = a.T @ a + np.diag([0, 0, 0, *[1 / _OPEN_RAD**2] * 3])
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
     covariance = np.linalg.pinv(normal * np.outer(scale, scale), rcond=1e-13)
     covariance = covariance * np.outer(scale, scale)
-    return covariance @ (a.T @ b), np.asarray(covariance)
+    return np.asarray(covariance @ (a.T @ b.ravel())), np.asarray(covariance)
 
 
 def _moved(seen: Seen, motion: SensorMotion, state: ClockFit, step: Floats) -> ClockFit:
-    return _evaluated(
+    return evaluated(
         seen,
         motion,
         state.offset_s + float(step[0]),

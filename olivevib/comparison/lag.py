@@ -16,6 +16,7 @@ _ENVELOPE_WINDOW_S = 0.25
 _LIVELY = 0.15  # spread of an envelope, of its mean, from which it can tell a lag
 _CHUNK = 64
 _ALIKE = 0.005  # of correlation
+_NONE = np.empty(0)
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,8 @@ class CoarseLag:
     """The best lag, how well both motions correlate there, and the best rival lag.
 
     scatter_s: rms distance of the lags that do as well as the rival; level: no envelope placed
-    the search, so that lags outside it may do as well.
+    the search, so that lags outside it may do as well. alike_s (K,): every lag that does as well as
+    the rival, the best among them.
     """
 
     offset_s: float
@@ -32,6 +34,7 @@ class CoarseLag:
     second_peak: float
     scatter_s: float
     level: bool
+    alike_s: Floats
 
 
 def offsets_that_overlap(
@@ -125,9 +128,11 @@ def fine_lag(
     away = offsets_s - offsets_s[best]
     far = np.abs(away) >= apart_s
     if not far.any():
-        return CoarseLag(float(offsets_s[best]), float(worth[best]), np.nan, 0.0, 0.0, level)
+        return CoarseLag(float(offsets_s[best]), float(worth[best]), np.nan, 0.0, 0.0, level, _NONE)
     rival = int(np.flatnonzero(far)[np.argmax(worth[far])])
-    alike = away[worth > worth[rival] - _ALIKE]
+    good = worth > worth[rival] - _ALIKE
+    tops = good & (worth >= np.roll(worth, 1)) & (worth >= np.roll(worth, -1))
+    alike = away[good]
     return CoarseLag(
         offset_s=float(offsets_s[best]),
         peak=float(worth[best]),
@@ -135,6 +140,7 @@ def fine_lag(
         second_peak=float(worth[rival]),
         scatter_s=float(np.sqrt(np.mean(alike**2))),
         level=level,
+        alike_s=np.asarray(offsets_s[tops]),
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from olivevib.comparison import Comparison, ComparisonSettings
+from olivevib.comparison import Comparison, ComparisonSettings, View
 from olivevib.comparison import compare as compare_records
 from olivevib.errors import Caution, InputError, UsageError
 from olivevib.files.accelerometer import (
@@ -19,6 +19,7 @@ from olivevib.files.accelerometer import (
     write_preset,
 )
 from olivevib.files.store import write_stage
+from olivevib.pipeline.marker_views import marker_views
 from olivevib.pipeline.motions import body_point, marker_motion
 from olivevib.progress import Tick, silent
 from olivevib.reconstruction import Trajectory
@@ -95,10 +96,14 @@ def compare_sensor(
     """One sensor, and what it recorded, against the marker it is bound to."""
     sensor, record = of
     point = _at_sensor(trajectory, motion, sensor)
-    exposure = trial.settings.cameras.left.exposure_ms
-    settings = ComparisonSettings(exposure_s=(exposure or 0.0) * 1e-3)
     marker = -1 if sensor.marker is None else sensor.marker
-    return compare_records(point, _three_axes(record), marker, sensor.file, settings, tick)
+    views: tuple[View, ...] | None
+    if trajectory.method == "continuous":  # the fit has given back what the exposure took
+        settings, views = ComparisonSettings(), marker_views(trial, trajectory, marker)
+    else:
+        exposure_s = (trial.settings.cameras.left.exposure_ms or 0.0) * 1e-3
+        settings, views = ComparisonSettings(exposure_s=exposure_s), None
+    return compare_records(point, _three_axes(record), marker, sensor.file, settings, tick, views)
 
 
 def _three_axes(record: AccelerometerRecord) -> Samples:
