@@ -14,6 +14,7 @@ import small_trial
 from small_videos import cut
 
 from olivevib import pipeline
+from olivevib.cli import main
 from olivevib.errors import InputError, UsageError
 from olivevib.files.store import read_stage
 from olivevib.progress import Cancelled
@@ -232,6 +233,21 @@ def test_exports_and_check(done, tmp_path):
         assert h5.attrs
     states = {f.what: f.state for f in pipeline.check(done.folder)}
     assert states["left.nut"] == states["tracks.h5"] == "whole"
+
+
+def test_an_export_of_what_is_stale_warns_and_of_what_is_damaged_fails(videos, tmp_path, capsys):
+    trial = small_trial.make(tmp_path / "stale", videos)
+    list(pipeline.run(trial))
+    verb = ["export", str(trial.folder), "--to", "csv", "-o", str(tmp_path / "out.csv")]
+    assert main(verb) == 0
+    trial.changed({"detection.fill": 0.75})
+    assert main(verb) == 3
+    assert "export-stale" in capsys.readouterr().err
+    assert (tmp_path / "out.csv").exists()
+    tracks = trial.folder / "tracks.h5"
+    tracks.write_bytes(tracks.read_bytes()[:-2000])
+    assert main(verb) == 1
+    assert "tracks.h5" in capsys.readouterr().err
 
 
 def test_check_tells_damage_and_what_can_be_remade(videos, tmp_path):

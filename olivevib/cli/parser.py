@@ -281,7 +281,7 @@ Without --led: a trial whose calibration board was waved in a video; the row tim
 
 
 _SERVE = """\
-needs the extra textual-serve: pip install 'olivevib[serve]'. Whoever reaches the port can do in the
+needs the package textual-serve: pip install textual-serve. Whoever reaches the port can do in the
 workspace whatever the app can; without --host only this computer does.
 """
 

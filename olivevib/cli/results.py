@@ -15,13 +15,12 @@ from olivevib.errors import OlivevibError
 
 def show(arguments: argparse.Namespace, console: Console) -> int:
     """Print state and headline numbers."""
-    from olivevib.trial import Trial
+    from olivevib.cli.trials import trial_of
     from olivevib.trial.summary import summary
-    from olivevib.trial.workspace import find_trial
 
     if arguments.trial is None:
         return _list(arguments.json)
-    facts = summary(Trial.open(find_trial(arguments.trial, Path())).readable())
+    facts = summary(trial_of(arguments.trial, console).readable())
     if arguments.json:
         _out(json.dumps(facts, indent=2, ensure_ascii=False, allow_nan=False))
     else:
@@ -75,28 +74,27 @@ def report(arguments: argparse.Namespace, console: Console) -> int:
 def export(arguments: argparse.Namespace, console: Console) -> int:
     """Write the 3-D paths for another program."""
     from olivevib import pipeline
-    from olivevib.trial import Trial
-    from olivevib.trial.workspace import find_trial
+    from olivevib.cli.trials import trial_of
 
-    trial = Trial.open(find_trial(arguments.trial, Path()))
+    trial = trial_of(arguments.trial, console)
     ids = values.id_list(arguments.markers) or None
     if arguments.output == "-":
-        pipeline.export(trial, arguments.to, sys.stdout.buffer, ids)
-        return 0
+        found = pipeline.export(trial, arguments.to, sys.stdout.buffer, ids)
+        return 3 if console.cautions(found) else 0
     target = (
         Path(arguments.output) if arguments.output else pipeline.export_place(trial, arguments.to)
     )
-    pipeline.export(trial, arguments.to, target, ids)
+    found = pipeline.export(trial, arguments.to, target, ids)
     _out(str(target))
-    return 0
+    return 3 if console.cautions(found) else 0
 
 
 def check(arguments: argparse.Namespace, console: Console) -> int:
     """Say what of a trial is whole, what is lost, what can be remade."""
     from olivevib import pipeline
-    from olivevib.trial.workspace import find_trial
+    from olivevib.cli.trials import folder_of
 
-    findings = pipeline.check(find_trial(arguments.trial, Path()), console.tick)
+    findings = pipeline.check(folder_of(arguments.trial, console), console.tick)
     for finding in findings:
         _out(f"{finding.state:8} {finding.what}  {finding.words}".rstrip())
     states = {finding.state for finding in findings}

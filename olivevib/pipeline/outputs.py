@@ -6,13 +6,17 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+from olivevib.errors import Caution, InputError
 from olivevib.files.exports import ExportFacts
 from olivevib.files.exports import export as write_export
 from olivevib.progress import Tick, silent
-from olivevib.trial import Trial
+from olivevib.trial import Condition, Trial
 
 if TYPE_CHECKING:
     from olivevib.report import Also
+
+
+_CHAIN = ("rig.toml", "calibration.h5", "tracks.h5", "trajectory.h5")
 
 
 def export_place(trial: Trial, to: str) -> Path:
@@ -22,13 +26,37 @@ def export_place(trial: Trial, to: str) -> Path:
 
 def export(
     trial: Trial, to: str, target: Path | BinaryIO, ids: tuple[int, ...] | None = None
-) -> None:
-    """Write the paths of the markers ``ids`` (None: all); InputError before reconstruct."""
-    trajectory = trial.trajectory
+) -> tuple[Caution, ...]:
+    """Write the paths of the markers ``ids`` (None: all); what is stale or left out comes back.
+
+    InputError before reconstruct, and where a file that the paths come from is damaged.
+    """
+    sound = trial.readable()
+    for name, why in sound.damage:
+        if name in _CHAIN:
+            raise InputError(
+                f"trial {trial.name} is damaged: its paths are not exported.",
+                f"{name}: {why}",
+                f"Run: olivevib check {trial.name}   then   olivevib run {trial.name}",
+            )
+    trajectory = sound.trajectory
     if trajectory is None:
         raise trial.need("reconstruct")
-    facts = ExportFacts(trial.name, trial.rig, tuple(trial.spectra.values()))
+    facts = ExportFacts(trial.name, sound.rig, tuple(sound.spectra.values()))
     write_export(trajectory, to, target, facts, ids)
+    return tuple(_export_cautions(sound))
+
+
+def _export_cautions(trial: Trial) -> Iterator[Caution]:
+    """What a person should know of the file: paths that are not those of the trial as it is now."""
+    state = trial.states()["reconstruct"]
+    if state.state is not Condition.DONE:
+        yield Caution(
+            "export-stale",
+            f"What was exported is not up to date: reconstruct is {state.state} ({state.reason}).",
+            f"Run: olivevib run {trial.name}   and export again.",
+        )
+    yield from (c for c in trial.cautions if c.code == "file-damaged")
 
 
 def report(
