@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from test_detection_paper import LIBRARY, PLACES, places
 
 from olivevib.detection.card_fit import blurred_pixels, fit_card
 from olivevib.detection.fitted_points import fitted_points
-from olivevib.detection.noise import autocorrelation, edge_noise
+from olivevib.detection.noise import autocorrelation, edge_noise, noise_covariance
 from olivevib.detection.template import Blur, card, draw_template
 from olivevib.detection.template_reader import TemplateReader
 from olivevib.files.prints import marker_modules
@@ -185,12 +187,33 @@ def test_autocorrelation_of_white_and_of_smoothed_noise():
     noise[2:-2, 2:-2] = white
     kernel = autocorrelation(noise, seen)
     assert kernel[2, 2] == pytest.approx(9, rel=0.05)
-    assert np.count_nonzero(kernel) <= 3
+    assert np.count_nonzero(kernel) == 1
     noise[2:-2, 2:-2] = cv2.GaussianBlur(white, (0, 0), 0.8)
     kernel = autocorrelation(noise, seen)
     assert np.count_nonzero(kernel) > 8
     assert kernel[2, 3] / kernel[2, 2] == pytest.approx(np.exp(-1 / (4 * 0.64)), abs=0.08)
     assert np.array_equal(kernel, kernel[::-1, ::-1])
+
+
+def test_what_a_fit_takes_out_of_smooth_noise_is_given_back():
+    """A fit of slow waves to few pixels leaves residuals quieter than the noise was."""
+    rng = np.random.default_rng(4)
+    n = 24
+    y, x = (part.ravel() for part in np.mgrid[:n, :n])
+    waves = [np.cos(np.pi * (a * x + b * y) / n) for a in range(4) for b in range(4)]
+    J = np.array(waves, np.float32)
+    E = np.asarray(np.linalg.solve(J @ J.T, J), dtype=np.float32)
+    pixels, clear, flat = SimpleNamespace(x=x, y=y), np.ones(n * n, bool), np.zeros_like(J[0])
+    stated, true, left = [], [], []
+    for _ in range(100):
+        noise = cv2.GaussianBlur(rng.normal(0, 3, (n + 10, n + 10)), (0, 0), 0.7)[5:-5, 5:-5]
+        noise = noise.ravel().astype(np.float32)
+        residual = noise - (E @ noise) @ J
+        stated.append(np.trace(noise_covariance(pixels, (J, E), residual, clear, flat)[0]))
+        true.append(((E @ noise)[:8] ** 2).sum())
+        left.append(residual.var() / noise.var())
+    assert np.mean(left) < 0.9  # what is to be given back
+    assert np.mean(stated) == pytest.approx(np.mean(true), rel=0.1)
 
 
 def test_noise_that_grows_with_the_slope_is_seen_and_white_noise_left_alone():

@@ -196,9 +196,10 @@ def fit_template(template: Template, pixels: Pixels) -> Fit | None:
     H = image_homography(end.state.W, (pixels.centre, pixels.scale)) @ template.H
     even = _in_even_light(pixels, end.state)
     counts = np.maximum(np.bincount(pixels.cell, minlength=9), 1)
-    estimate = (inverse[:8].astype(np.float32) @ (WJ / np.sqrt(pixels.trust))).astype(np.float32)
+    root = np.sqrt(pixels.trust)
+    linear = (end.J * root, (inverse.astype(np.float32) @ (WJ / root)).astype(np.float32))
     slope2 = end.J[2] ** 2 + end.J[5] ** 2  # by a shift along x, along y
-    covariance, noise, excess = noise_covariance(pixels, estimate, whitened, clear, slope2)
+    covariance, noise, excess = noise_covariance(pixels, linear, whitened, clear, slope2)
     return Fit(
         H=H / H[2, 2],
         image=pixels.level - end.residual,
