@@ -77,6 +77,11 @@ def settings(pairs: list[str]) -> dict[str, Any]:
     return out
 
 
+def counted(number: int, word: str) -> str:
+    """A number of things in words: 1 frame, 3 frames, no frames."""
+    return f"{number or 'no'} {word}{'s' * (number != 1)}"
+
+
 def with_sigma(value: float, sigma: float | None, digits: int) -> str:
     """Value ± sigma with two significant digits of sigma, at most seven decimals.
 

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 import small_trial
+from small_videos import make_video
 
 from olivevib import pipeline
 from olivevib.calibration.artwork import charuco_board
@@ -51,7 +52,11 @@ def stills(folder: Path, right: bool, change=lambda grey: grey, views: int = 8) 
 
 @pytest.fixture(scope="module")
 def videos(tmp_path_factory) -> dict[str, Path]:
-    return small_trial.record(tmp_path_factory.mktemp("videos"), frames=3)
+    folder = tmp_path_factory.mktemp("videos")
+    names = {side: folder / f"{side}.avi" for side in ("left", "right")}
+    for path in names.values():
+        make_video(path, frames=3, size=SIZE)
+    return names
 
 
 def trial(folder: Path, videos: dict[str, Path], board: str = SPEC, change=lambda grey: grey):

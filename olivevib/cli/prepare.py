@@ -69,10 +69,9 @@ def _preset(name: str | None) -> str | None:
 def preset(arguments: argparse.Namespace, console: Console) -> int:
     """Keep how a trial's accelerometer file is read, for other trials."""
     from olivevib import pipeline
-    from olivevib.trial import Trial
-    from olivevib.trial.workspace import find_trial
+    from olivevib.cli.trials import trial_of
 
-    trial = Trial.open(find_trial(arguments.trial, Path()))
+    trial = trial_of(arguments.trial, console)
     path = pipeline.keep_preset(trial, arguments.name, arguments.sensor, Path())
     print(path)
     console.say(f"Next: olivevib new TRIAL … --accelerometer FILE --preset {arguments.name}")
@@ -81,11 +80,10 @@ def preset(arguments: argparse.Namespace, console: Console) -> int:
 
 def archive(arguments: argparse.Namespace, console: Console) -> int:
     """Leave trials out of lists, or take them back; nothing on the disk moves."""
-    from olivevib.trial import Trial
-    from olivevib.trial.workspace import find_trial
+    from olivevib.cli.trials import trial_of
 
     for name in arguments.trials:
-        trial = Trial.open(find_trial(name, Path()))
+        trial = trial_of(name, console)
         trial.changed({"session.archived": None if arguments.undo else True})
         console.say(f"{trial.name} is {'listed again' if arguments.undo else 'archived'}.")
     return 0

@@ -34,12 +34,11 @@ def row_time(arguments: argparse.Namespace, console: Console) -> int:
 
 def _from_board(arguments: argparse.Namespace, console: Console) -> int:
     """Tell the row times that the waved board of a trial's calibration showed, and keep them."""
+    from olivevib.cli.trials import trial_of
     from olivevib.pipeline.row_time import board_row_times
-    from olivevib.trial import Trial
     from olivevib.trial.camera_book import remember, workspace_of
-    from olivevib.trial.workspace import find_trial
 
-    trial = Trial.open(find_trial(arguments.file, Path()))
+    trial = trial_of(arguments.file, console)
     workspace = workspace_of(trial.folder)
     for measured in board_row_times(trial):
         print(measured.words)

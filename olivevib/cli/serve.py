@@ -19,8 +19,8 @@ def serve(arguments: argparse.Namespace, console: Console) -> int:
     if importlib.util.find_spec("textual_serve") is None:
         raise UsageError(
             "the app in a browser needs the package textual-serve, which is not installed.",
-            "It is an extra, because few need it.",
-            "Install it: pip install 'olivevib[serve]'",
+            "It is an extra, because few need it; the app in a terminal works without.",
+            "Install it beside olivevib: pip install textual-serve",
         )
     from olivevib.cli.browser import LocalServer
 

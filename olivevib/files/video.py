@@ -23,6 +23,7 @@ from olivevib.errors import Caution, InputError
 from olivevib.files.container import has_stamps, open_container, video_path
 from olivevib.files.frame_order import FrameOrder, Placed
 from olivevib.files.packets import Packets
+from olivevib.values import counted
 
 _PACKED_LUMA = {"yuyv422": 0, "yvyu422": 0, "uyvy422": 1}  # offset of the luma bytes, step 2
 
@@ -246,6 +247,6 @@ def _damage(path: Path, damaged: int) -> Caution | None:
         return None
     return Caution(
         "video-damaged",
-        f"{path}: {damaged} frames are damaged, or rest on damaged ones, and are left out.",
+        f"{path}: {counted(damaged, 'frame')} left out: damaged, or resting on damaged ones.",
         "Copy the recording again from the camera; check its memory card or cable.",
     )

@@ -76,7 +76,7 @@ def _not_found(trial: Trial, board: Board, recording: BoardRecording) -> InputEr
     finding = diagnose(board, recording.sample, board_reader(trial, board))
     count = len(recording.views)
     return InputError(
-        f"the {recording.side} calibration ({recording.path.name}) shows the {board.name} in "
+        f"the {recording.side} board recording, {recording.path}, shows the {board.name} in "
         f"{count} of {recording.frames} frames.",
         finding.text,
         finding.remedy.replace("--board ", "--set calibration.board="),
@@ -145,7 +145,11 @@ def _distances(result: Calibration) -> Floats:
 
 def _facts(recordings: dict[str, BoardRecording], result: Calibration) -> dict[str, Any]:
     """Further numbers for the report, unit in the name; None where not known."""
-    facts: dict[str, Any] = {"method": result.method, "common_frames": result.common_frames}
+    facts: dict[str, Any] = {
+        "method": result.method,
+        "common_frames": result.common_frames,
+        "views_chosen": result.choice or None,
+    }
     for side in SIDES:
         facts[f"{side}_frames"] = recordings[side].frames
         facts[f"{side}_views"] = len(recordings[side].views)

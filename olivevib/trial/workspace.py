@@ -31,6 +31,13 @@ def find_trial(name: str, workspace: Path) -> Path:
     )
 
 
+def hidden_by(taken: Path, name: str, workspace: Path) -> Path | None:
+    """Another trial that the name could have meant; None where ``taken`` is the only one."""
+    other = workspace / "trials" / name
+    there = (other / FILE).is_file() and other.resolve() != taken.resolve()
+    return other if there else None
+
+
 def place_for_new(name: str, workspace: Path) -> Path:
     """Where a new trial goes: a bare name under ``trials/`` of a workspace, else the path given."""
     path = Path(name)

@@ -10,6 +10,7 @@ from olivevib.errors import Caution
 from olivevib.progress import Tick
 from olivevib.tui.harmless import harmless
 from olivevib.tui.work import Result, Work
+from olivevib.values import counted
 
 if TYPE_CHECKING:
     from olivevib.calibration.guidance import Guidance
@@ -25,7 +26,7 @@ def run_all(folder: Path) -> Work:
 
         outcomes = list(pipeline.run(Trial.open(folder), tick))
         done = [o.stage for o in outcomes if o.words == "done"]
-        cautions = tuple(c for o in outcomes for c in o.cautions)
+        cautions = Trial.open(folder).cautions  # also of stages that were up to date
         return Result(_ran(done, cautions), cautions)
 
     return Work(f"{_name(folder)}: run", do)
@@ -45,9 +46,11 @@ def run_one(folder: Path, stage: str) -> Work:
 
 
 def _ran(done: Sequence[str], cautions: Sequence[Caution]) -> str:
+    warned = f"; {counted(len(cautions), 'warning')} to read" if cautions else ""
     if not done:
-        return "Nothing to do: every stage that can run is up to date. v shows the results."
-    warned = f"; {len(cautions)} warning{'s' * (len(cautions) != 1)} to read" if cautions else ""
+        return (
+            f"Nothing to do: every stage that can run is up to date{warned}. v shows the results."
+        )
     return f"{', '.join(done)} done{warned}. v shows the results, e makes the report."
 
 
@@ -141,7 +144,7 @@ def check_trial(folder: Path) -> Work:
         findings = pipeline.check(folder, tick)
         bad = [f for f in findings if f.state != "whole"]
         told = "; ".join(f"{f.what} {f.state}: {f.words}" for f in bad)
-        return Result(f"{len(findings)} things checked, {told or 'all whole'}.")
+        return Result(f"{counted(len(findings), 'thing')} checked, {told or 'all whole'}.")
 
     return Work(f"{_name(folder)}: check", do)
 

@@ -8,6 +8,7 @@ from rich.text import Text
 from olivevib.tui.frames import Shot
 from olivevib.tui.views.palette import Palette
 from olivevib.tui.views.picture import Outline, Window
+from olivevib.values import counted
 
 INSET_PX = (280.0, 210.0)  # bars and most modules of a marker can be seen
 
@@ -46,7 +47,7 @@ def shot_words(shot: Shot, chosen: int | None, palette: Palette) -> Text:
     if np.isfinite(shot.t_s):
         out.append(f"  {shot.t_s:.4f} s (camera's stamp)", palette.muted)
     found = "found in this picture alone" if shot.detected else "tracked here"
-    out.append(f"  {len(shot.markers) or 'no'} markers {found}")
+    out.append(f"  {counted(len(shot.markers), 'marker')} {found}")
     for marker in shot.markers:
         if marker.id == chosen:
             sides = np.hypot(*np.diff(marker.corners_px[[0, 1, 2, 3, 0]], axis=0).T)
