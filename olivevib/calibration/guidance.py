@@ -50,6 +50,16 @@ class Guidance:
     words: str
 
     @property
+    def measures(self) -> str:
+        """How many views, tilts and distances there are, of how many, in words."""
+        sides = [f"{side} {'yes' if side not in self.still else '--'}" for side in TILTS]
+        return (
+            f"{self.pairs} of {LEAST_PAIRS} views · side nearer to the cameras: {', '.join(sides)} "
+            f"({self.tilts} of {LEAST_TILTS}) · farthest {self.far_to_near:.1f} times nearest "
+            f"(of {LEAST_DEPTH:g})"
+        )
+
+    @property
     def advice(self) -> str:
         """What to show next, and what the calibration would know now."""
         return self.words if self.forecast is None else f"{self.words}; {self.forecast.words}"

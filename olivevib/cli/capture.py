@@ -28,13 +28,13 @@ def capture(arguments: argparse.Namespace, console: Console) -> int:
     from olivevib.pipeline.capture import capture as record
 
     plan = _plan(arguments)
-    folder = _folder(arguments.trial)
+    folder = folder_of(arguments.trial)
     place = place_of(folder, plan)
     how = f"for {plan.seconds:g} s" if plan.seconds else "until Ctrl-C"
     console.say(f"Recording {'the board' if plan.board else 'the tree'} into {place} {how}.")
-    with _stopping() as stop:
+    with stopping() as stop:
         watch = _Watcher(console, stop)
-        hold = _until_enter(console) if arguments.wait else at_once
+        hold = until_enter(console) if arguments.wait else at_once
         captured = record(place, plan, watch, console.tick, hold)
     cut_short = stop.asked and plan.seconds is not None
     print(captured.verdict.words)
@@ -60,7 +60,7 @@ def _next(name: str, plan: CapturePlan, *, made: bool, console: Console) -> None
         console.say(f"Next: the tree: olivevib capture {name} --left … --right …")
 
 
-def _folder(name: str) -> Path:
+def folder_of(name: str) -> Path:
     """The trial's folder: one that is there, or the place for a new one."""
     from olivevib.trial.workspace import find_trial, place_for_new
 
@@ -89,7 +89,7 @@ def _plan(arguments: argparse.Namespace) -> CapturePlan:
     )
 
 
-def _until_enter(console: Console) -> Hold:
+def until_enter(console: Console) -> Hold:
     """Hold the recording back until somebody presses Enter (or the input ends)."""
     pressed = threading.Event()
 
@@ -102,7 +102,7 @@ def _until_enter(console: Console) -> Hold:
     return lambda: not pressed.is_set()
 
 
-class _Stop:
+class Stop:
     """Whether somebody wants the recording to end."""
 
     def __init__(self) -> None:
@@ -114,9 +114,9 @@ class _Stop:
 
 
 @contextlib.contextmanager
-def _stopping() -> Iterator[_Stop]:
+def stopping() -> Iterator[Stop]:
     """While the body runs, Ctrl-C and SIGTERM ask for the end instead of forcing it."""
-    stop = _Stop()
+    stop = Stop()
     before = {s: signal.signal(s, stop.ask) for s in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield stop
@@ -128,7 +128,7 @@ def _stopping() -> Iterator[_Stop]:
 class _Watcher:
     """Shows the state of a capture: one line that is drawn anew, and what is new as sentences."""
 
-    def __init__(self, console: Console, stop: _Stop) -> None:
+    def __init__(self, console: Console, stop: Stop) -> None:
         self._console = console
         self._stop = stop
         self._told: dict[str, str] = {}

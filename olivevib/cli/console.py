@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TextIO
 
 from olivevib.errors import Caution
@@ -25,6 +25,7 @@ class Console:
         self._started = time.monotonic()
         self._note = ""
         self._open = False
+        self._painted = 0  # lines of the picture that stands on the terminal
 
     def say(self, text: str) -> None:
         """A sentence on a line of its own."""
@@ -58,12 +59,34 @@ class Console:
                 self.say(f"  {note} {done}" + (f"/{total}" if total else ""))
         elif finished or now - self._drawn > REDRAW_S:
             self._drawn = now
+            if self._painted:
+                self._clear()
             width = shutil.get_terminal_size().columns - 1
             line = f"  {note}  {_bar(done, total)}{_left(done, total, now - self._started)}"
             print(f"\r\x1b[K{line[:width]}", end="", file=self._stream, flush=True)
             self._open = True
 
+    def paint(self, lines: Sequence[str]) -> bool:
+        """Draw several lines over those painted before; False where nothing can be drawn over."""
+        if not self._live:
+            return False
+        self._clear()
+        size = shutil.get_terminal_size()
+        shown = [line[: size.columns - 1] for line in lines[: size.lines - 1]]
+        if shown:
+            print("\n".join(shown), file=self._stream, flush=True)
+        self._painted = len(shown)
+        return True
+
+    def ring(self, bell: str = "\a") -> None:
+        """Call somebody who looks elsewhere, on a terminal only."""
+        if self._live:
+            print(bell, end="", file=self._stream, flush=True)
+
     def _clear(self) -> None:
+        if self._painted:
+            print(f"\x1b[{self._painted}F\x1b[J", end="", file=self._stream)
+            self._painted = 0
         if self._open:
             print("\r\x1b[K", end="", file=self._stream)
             self._open = False

@@ -190,6 +190,7 @@ def _stage_verbs(verbs: Any) -> None:
             look = stage.add_mutually_exclusive_group()
             look.add_argument("--preview", action="store_true", help=_PREVIEW)
             look.add_argument("--sigma", action="store_true", help=_SIGMA_MAP)
+            _live_options(stage)
         _set_option(stage)
         stage.set_defaults(stage=name)
     run = _add(verbs, "run", "stages:run", "every stage that is missing or stale, in order")
@@ -203,7 +204,22 @@ def _stage_verbs(verbs: Any) -> None:
     batch.add_argument("--json", action="store_true", help="results as JSON, for programs")
 
 
-_PREVIEW = "only show what the board recordings cover, and what is still to be shown"
+def _live_options(parser: Any) -> None:
+    live = parser.add_argument_group("--preview on running cameras (recorded into TRIAL)")
+    live.add_argument("--left", metavar="DEVICE", help="the left camera, as in olivevib capture")
+    live.add_argument("--right", metavar="DEVICE", help="the right camera")
+    live.add_argument("--board", metavar="SPEC", help="default: the board of the trial")
+    live.add_argument("--seconds", type=float, metavar="S", help="length (default: to enough)")
+    live.add_argument("--size", metavar="WxH", help="picture size, such as 1280x720")
+    live.add_argument("--fps", type=float, metavar="N", help="frames a second")
+    live.add_argument("--exposure", type=float, metavar="MS", help="fixed, with the focus (Linux)")
+    live.add_argument(
+        "--markers", metavar="LIB", default="olive49", help="library of a coded board"
+    )
+    live.add_argument("--wait", action="store_true", help="record only after Enter")
+
+
+_PREVIEW = "what the board covers, and what to show next: of recordings, or of running cameras"
 _SIGMA_MAP = "only print the sigma to expect over the working volume, from rig.toml (CSV)"
 _BATCH = """\
 prints a line a trial: its name and the hash of its results, equal wherever it was measured.

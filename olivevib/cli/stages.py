@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from olivevib import values
 from olivevib.cli.console import Console
+from olivevib.errors import UsageError
 from olivevib.values import counted
 
 if TYPE_CHECKING:
@@ -29,6 +30,10 @@ def one(arguments: argparse.Namespace, console: Console) -> int:
     changes = values.settings(arguments.set)
     if arguments.paper:
         changes |= PAPER_KEYS[arguments.stage]
+    if arguments.stage == "calibrate" and _on_cameras(arguments):
+        from olivevib.cli.live_board import live_preview
+
+        return live_preview(arguments, console)
     if arguments.stage == "calibrate" and (arguments.preview or arguments.sigma):
         from olivevib.cli import calibration
 
@@ -41,6 +46,19 @@ def one(arguments: argparse.Namespace, console: Console) -> int:
         cautions = pipeline.run_stage(trial, arguments.stage, console.tick)
         warned += console.cautions(cautions)
     return 3 if warned else 0
+
+
+def _on_cameras(arguments: argparse.Namespace) -> bool:
+    """Whether the preview is to run on cameras; UsageError where that makes no sense."""
+    if arguments.left is None and arguments.right is None:
+        return False
+    if not arguments.preview or len(arguments.trials) != 1 or arguments.set or arguments.paper:
+        raise UsageError(
+            "--left and --right name cameras for the preview of one trial.",
+            "They go with --preview and one TRIAL, without --set and --paper.",
+            "Record first: olivevib calibrate TRIAL --preview --left DEVICE --right DEVICE",
+        )
+    return True
 
 
 def run(arguments: argparse.Namespace, console: Console) -> int:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from olivevib.calibration.guidance import Guidance, Guide
+import numpy as np
+
+from olivevib.arrays import Bools
+from olivevib.calibration.guidance import Guidance, Guide, covered
 from olivevib.files.stills import open_source
 from olivevib.pipeline.boards import board_finder, board_paths, trial_board
+from olivevib.pipeline.capture import CaptureState
 from olivevib.pipeline.recordings import SIDES
 from olivevib.progress import Tick, silent
 from olivevib.trial import Trial
@@ -47,7 +51,22 @@ def preview(trial: Trial, show: Show, tick: Tick = silent) -> Guidance:
     return guide.state()
 
 
-def picture(told: Guidance, side: str) -> Iterator[str]:
-    """The cells of one camera's picture as lines of text: a block where the board was seen."""
-    for row in told.seen[side]:
-        yield "".join("██" if cell else "··" for cell in row)
+def picture(told: Guidance, side: str, now: Bools | None = None) -> Iterator[str]:
+    """The cells of one camera's picture as lines of text: a block where the board was seen.
+
+    now (rows, columns): where the board is at this moment, if that is to be marked.
+    """
+    here = np.zeros_like(told.seen[side]) if now is None else now
+    for row, at in zip(told.seen[side], here, strict=True):
+        yield "".join(
+            "▒▒" if a else "██" if cell else "··" for cell, a in zip(row, at, strict=True)
+        )
+
+
+def where_now(state: CaptureState | None, side: str) -> Bools | None:
+    """The cells under the board in a camera's last picture; None where it is not in it."""
+    camera = None if state is None else state.cameras.get(side)
+    look = None if camera is None else camera.look
+    if camera is None or look is None or look.board is None:
+        return None
+    return covered(look.board, camera.facts.size_px)

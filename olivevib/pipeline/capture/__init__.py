@@ -13,7 +13,7 @@ from olivevib.pipeline.capture.plan import (
 )
 from olivevib.pipeline.capture.prompts import Prompt, Prompter
 from olivevib.pipeline.capture.record import capture
-from olivevib.pipeline.capture.trial import board_in, place_of, trial_from
+from olivevib.pipeline.capture.trial import board_in, board_trial, place_of, trial_from
 from olivevib.pipeline.capture.verdict import CameraResult, Verdict, good_for, judge
 
 __all__ = [
@@ -31,6 +31,7 @@ __all__ = [
     "advise",
     "at_once",
     "board_in",
+    "board_trial",
     "capture",
     "good_for",
     "judge",

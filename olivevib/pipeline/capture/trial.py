@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from olivevib.errors import UsageError
+from olivevib.files.atomic import write_text_atomic
 from olivevib.files.capture import read_sidecar, sidecar_of
 from olivevib.files.trial_folders import FILE
 from olivevib.pipeline.capture.plan import Captured, CapturePlan
@@ -23,11 +24,12 @@ CALIBRATION = "calibration"
 def place_of(folder: Path, plan: CapturePlan) -> Path:
     """Where the recordings of a trial go: into its folder, the board's into calibration/.
 
-    UsageError for the tree of a trial that has its recordings already.
+    UsageError for the tree of a trial that has its recordings already; one of a board alone
+    (``board_trial``) still waits for its tree.
     """
     if plan.board is not None:
         return folder / CALIBRATION
-    if (folder / FILE).exists():
+    if (folder / FILE).exists() and _has_tree(folder):
         raise UsageError(
             f"{folder} is a trial already.",
             "A capture never overwrites one.",
@@ -69,9 +71,48 @@ def trial_from(
         band_hz=plan.band_hz,
         simulated=any(name.startswith("simulated:") for name in (plan.left, plan.right)),
     )
-    trial = new_trial(folder, told, tick)
+    there = (folder / FILE).exists()
+    trial = _with_tree(folder, told) if there else new_trial(folder, told, tick)
     facts = _camera_facts(folder)
     return trial.changed(facts) if facts else trial
+
+
+def board_trial(folder: Path, plan: CapturePlan, captured: Captured) -> Trial | None:
+    """The trial of a captured board, made where there is none yet: ``calibrate`` can run on it.
+
+    The tree may be captured into it later. None where not both recordings are there.
+    """
+    if len(captured.videos) < 2:
+        return None
+    if not (folder / FILE).exists():
+        first = (
+            "# An olivevib trial whose board was recorded first; olivevib capture adds the tree.\n"
+        )
+        simulated = any(name.startswith("simulated:") for name in (plan.left, plan.right))
+        mark = "\n[session]\nsimulated = true\n" if simulated else ""
+        write_text_atomic(folder / FILE, first + mark)
+    return _with_board(folder, plan)
+
+
+def _has_tree(folder: Path) -> bool:
+    cameras = Trial.open(folder).settings.cameras
+    return bool(cameras.left.video or cameras.right.video)
+
+
+def _with_tree(folder: Path, told: NewTrial) -> Trial:
+    """A trial of a board alone, told of the tree that was captured into its folder."""
+    changes: dict[str, object] = {
+        "markers.library": told.markers,
+        "markers.ids": list(told.ids) or None,
+        "markers.size_mm": told.size_mm,
+        "vibration.band_hz": list(told.band_hz) if told.band_hz else None,
+    }
+    for side in ("left", "right"):
+        changes[f"cameras.{side}.video"] = Path(getattr(told, side)).name
+        changes[f"cameras.{side}.stamps"] = Path(getattr(told, f"{side}_stamps")).name
+    if told.simulated:
+        changes["session.simulated"] = True
+    return Trial.open(folder).changed({k: v for k, v in changes.items() if v is not None})
 
 
 def _camera_facts(folder: Path) -> dict[str, object]:

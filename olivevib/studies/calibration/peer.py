@@ -74,10 +74,11 @@ def opencv_pair(left: Views, right: Views, size: tuple[int, int]) -> StereoRig:
         places.append(left[k].board_mm[at[0]].astype(np.float32))
         a.append(left[k].px[at[0]].astype(np.float32))
         b.append(right[m].px[at[1]].astype(np.float32))
+    K, d = [c.K for c in cameras], [c.distortion for c in cameras]
+    guess = flags | cv2.CALIB_USE_INTRINSIC_GUESS  # OpenCV writes into the arrays that it is given
     found = cv2.stereoCalibrate(
-        places, a, b, cameras[0].K, cameras[0].distortion, cameras[1].K, cameras[1].distortion,
-        size, flags=flags | cv2.CALIB_USE_INTRINSIC_GUESS,
-    )  # fmt: skip
+        places, a, b, K[0].copy(), d[0].copy(), K[1].copy(), d[1].copy(), size, flags=guess
+    )
     _, K1, d1, K2, d2, R, t = found[:7]
     return StereoRig(
         CameraModel(size, np.asarray(K1), np.asarray(d1, np.float64).ravel()[:5]),
