@@ -80,14 +80,14 @@ def refusal(made: Trial) -> InputError:
 
 def test_a_mirrored_recording_is_named_as_such(tmp_path, videos):
     error = refusal(trial(tmp_path, videos, change=lambda grey: cv2.flip(grey, 1)))
-    assert "right calibration" in error.what and "0 of 8 frames" in error.what
+    assert "right board recording" in error.what and "0 of 8 frames" in error.what
     assert "mirrored" in error.why and "8 of 8" in error.why
     assert "flip" in error.remedy
 
 
 def test_a_board_declared_inverted_that_is_not_is_told(tmp_path, videos):
     error = refusal(trial(tmp_path, videos, board=SPEC + ",inverted"))
-    assert "left calibration" in error.what and "not inverted" in error.why
+    assert "left board recording" in error.what and "not inverted" in error.why
     assert error.remedy.endswith(SPEC)
 
 
