@@ -1,14 +1,16 @@
 """Blind trials of the frequency above the frame rate: verdict against truth, on projected points.
 
 Nothing of the truth is given to the solver: row times and offset are drawn about it with the sigma
-that the solver is told. Half of the trials' seeds show what lead is safe, the others check it.
+that the solver is told, or it is told nothing of the offset. Half of the trials' seeds show what
+lead is safe, the others check it. Trials are kept by the hundred (studies.cells).
 """
 
 from __future__ import annotations
 
 import itertools
 import time
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from olivevib.arrays import Floats
 from olivevib.progress import Tick, silent
 from olivevib.reconstruction.motion import Anchor, MotionFit, fit_motion
 from olivevib.reconstruction.motion.decide import CONFIRMED_LEAD, in_step
+from olivevib.studies import cells
 from olivevib.studies.blind_scenes import (
     HALF_MM,
     RATE_HZ,
@@ -31,6 +34,7 @@ from olivevib.vibration.types import LineStatus
 
 TRIALS = 5000  # of which at least 3000 confirmed, at full effort
 SILENT_TRIALS = 100  # nothing to tell with: global shutters in step
+TOGETHER = 100  # trials of one cell
 SECONDS = 4.5
 RIGHT_HZ = 0.1
 CONTRAST_PX = 0.08  # below which no confirmation is asked for
@@ -58,16 +62,15 @@ NAMES = ("frequency, Hz", "offset, s", "row time, share", "amplitude, mm", "dept
 def run(effort: Effort, tick: Tick = silent) -> Study:
     """Verdict x truth, lead x truth, errors over sigma, cost."""
     count, quiet = effort.count(TRIALS, 4), effort.count(SILENT_TRIALS, 1)
-    found = []
-    for k in range(count):
-        tick(k, count + quiet, f"trial {k}")
-        found.append(one(effort.draws(k)))
+    found: list[Outcome] = []
+    for first in range(0, count, TOGETHER):
+        found += together(effort, range(first, min(first + TOGETHER, count)), count + quiet, tick)
     claims = 0
     for k in range(quiet):
         tick(count + k, count + quiet, "trials with nothing to tell by")
         claims += mute(effort.draws(k, 1))
-    first, second = found[0::2], found[1::2]
-    safe = max((o.lead for o in first if not o.right and np.isfinite(o.lead)), default=0.0)
+    even, odd = found[0::2], found[1::2]
+    safe = max((o.lead for o in even if not o.right and np.isfinite(o.lead)), default=0.0)
     return Study(
         name="blind",
         title="Frequency above the frame rate: blind trials on projected points",
@@ -79,10 +82,33 @@ def run(effort: Effort, tick: Tick = silent) -> Study:
             ("largest lead of a wrong branch, first half", f"{safe:.1f}"),
             (
                 f"wrong with a lead above {max(safe, CONFIRMED_LEAD):.1f}, second half",
-                str(sum(not o.right and o.lead > max(safe, CONFIRMED_LEAD) for o in second)),
+                str(sum(not o.right and o.lead > max(safe, CONFIRMED_LEAD) for o in odd)),
             ),
         ),
     )
+
+
+def together(effort: Effort, which: range, total: int, tick: Tick) -> list[Outcome]:
+    """Some trials by their numbers, measured now or kept from before."""
+
+    def measure() -> list[dict[str, Any]]:
+        out = []
+        for k in which:
+            tick(k, total, f"trial {k}")
+            out.append(asdict(one(effort.draws(k))))
+        return out
+
+    name = f"{effort.seed}-{which.start}-{which.stop}"
+    rows = cells.kept("blind", name, [effort.seed, which.start, which.stop, SECONDS], measure)
+    return [outcome_of(row) for row in rows]
+
+
+def outcome_of(row: dict[str, Any]) -> Outcome:
+    """One trial from its cell."""
+    more = {
+        "status": LineStatus(row["status"]), "z": tuple(row["z"]), "error": tuple(row["error"])
+    }  # fmt: skip
+    return Outcome(**{**row, **more})
 
 
 def one(draws: np.random.Generator) -> Outcome:
@@ -95,16 +121,16 @@ def one(draws: np.random.Generator) -> Outcome:
     fit = fit_motion(seen, pair, anchor)
     seconds = time.process_time() - start
     ratio = fit.f_hz / scene.f_hz
-    right = abs(fit.f_hz - scene.f_hz) < RIGHT_HZ
+    right = bool(abs(fit.f_hz - scene.f_hz) < RIGHT_HZ)
     z, error = _errors(scene, fit) if right else ((), ())
     size = float(np.linalg.norm(np.abs(scene.amplitude[:, 0, :3]), axis=1).max())
     asked = permitted(scene, anchor, size)
     return Outcome(
         fit.status,
         right,
-        fit.branches.lead,
+        float(fit.branches.lead),
         asked,
-        ratio,
+        float(ratio),
         size,
         z,
         error,
@@ -136,11 +162,11 @@ def permitted(scene: Scene, anchor: Anchor, size_mm: float) -> bool:
     marks = (7.5, 10.0, 15.0, 20.0, 22.5, 37.5, 40.0) if step else ()
     narrow = any(abs(f - m) < 0.3 for m in marks)
     known = anchor.left_row_time_sigma_s <= 0.05 * anchor.left_row_time_s
-    return contrast >= CONTRAST_PX and known and not near and not narrow
+    return bool(contrast >= CONTRAST_PX and known and not near and not narrow)
 
 
 def _errors(scene: Scene, fit: MotionFit) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Errors over their sigma, and errors, in the order of NAMES."""
+    """Errors over their sigma, and errors, in the order of NAMES; NaN: an offset that may slip."""
     t, row = fit.timing, fit.timing.reference_row
     left, right = (r / ROWS for r in scene.readout_s)
     offset = scene.offset_s + row * (right - left)
@@ -151,7 +177,7 @@ def _errors(scene: Scene, fit: MotionFit) -> tuple[tuple[float, ...], tuple[floa
     axis = int(np.argmax(np.abs(true[:2])))
     error = (
         t.frequency_hz - scene.f_hz,
-        t.right_offset_s - offset,
+        t.right_offset_s - offset if not t.offset_slip else float("nan"),
         t.left_row_time_s / left - 1,
         float(got[axis] - np.abs(true[axis])),
         float(got[2] - np.abs(true[2])),
@@ -203,19 +229,21 @@ def errors(found: list[Outcome]) -> Table:
         e = np.array([o.error[k] for o in mine])
         z = np.array([o.z[k] for o in mine])
         if e.size:
-            rows.append((name, rms(e), float(np.quantile(np.abs(e), 0.95)), rms(z), robust(z)))
+            rows.append((name, rms(e), float(np.nanquantile(np.abs(e), 0.95)), rms(z), robust(z)))
     columns = ("quantity", "error, rms", "95 % of |error|", "error over sigma, rms", "robust")
     return Table("Errors of confirmed trials of at least 1 mm", columns, tuple(rows))
 
 
 def rms(values: Floats) -> float:
-    """Root mean square, NaN of nothing."""
-    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+    """Root mean square of what is known, NaN of nothing."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
 
 def robust(values: Floats) -> float:
-    """1.4826 times the median size."""
-    return 1.4826 * float(np.median(np.abs(values))) if values.size else float("nan")
+    """1.4826 times the median size of what is known."""
+    known = values[np.isfinite(values)]
+    return 1.4826 * float(np.median(np.abs(known))) if known.size else float("nan")
 
 
 def goals(found: list[Outcome], claims: int, quiet: int) -> tuple[Goal, ...]:

@@ -21,6 +21,9 @@ from olivevib.reconstruction.motion.types import (
 
 RATE_HZ = 30.0
 ROWS = 720
+GROWTH = 0.1
+KINDS = {"steady": 0.87, "wandering": 0.08, "growing": 0.05}  # shares of the trials
+FAR_SHARE, FAR_S = 1 / 6, 0.15  # of trials whose offset nobody knows, and how far it may be
 HALF_MM = 27.3  # corner from centre along each axis: 60 mm marker, cornerstones 10/11 apart
 
 
@@ -29,6 +32,7 @@ class Scene:
     """The truth of one trial. readout_s of the whole picture, left and right, signed.
 
     amplitude (M, H, 6) complex of each marker's harmonics; sway: slow sines (f, complex (6,)).
+    kind: "steady", "wandering" (speed) or "growing" (by a tenth from the middle to the end).
     """
 
     f_hz: float
@@ -42,6 +46,7 @@ class Scene:
     common_px: float
     drops: float
     kind: str = "steady"
+    offset_known: bool = True
 
     def phase(self, t_s: Floats) -> Floats:
         """Phase of the machine, rad."""
@@ -53,8 +58,9 @@ class Scene:
         """Xi (..., 6) mm and rad at t_s."""
         out = np.zeros((*t_s.shape, 6))
         phase = self.phase(t_s)
+        size = 1.0 + (GROWTH * (2 * t_s / self.span_s - 1) if self.kind == "growing" else 0.0 * t_s)
         for h, a in enumerate(self.amplitude[marker], start=1):
-            out += np.real(a * np.exp(1j * h * phase)[..., None])
+            out += size[..., None] * np.real(a * np.exp(1j * h * phase)[..., None])
         for f, a in self.sway:
             out += np.real(a * np.exp(2j * np.pi * f * t_s)[..., None])
         return out
@@ -158,20 +164,22 @@ def draw_scene(draws: np.random.Generator, seconds: float) -> Scene:
         (float(draws.uniform(0.2, 2.0)), orbit(draws, draws.uniform(0, 6), 0.01)) for _ in range(2)
     )
     base = draws.uniform(8e-3, 33e-3)
+    near = draws.choice([0.0, draws.uniform(8e-3, 13e-3), draws.uniform(-0.0167, 0.0167)])
+    far = draws.uniform(-FAR_S, FAR_S) if draws.random() < FAR_SHARE else None
     readout = (base, base if draws.random() < 0.5 else draws.uniform(8e-3, 33e-3))
     return Scene(
         f_hz=float(draws.uniform(5, 45)),
         span_s=seconds,
         readout_s=readout,
-        offset_s=float(
-            draws.choice([0.0, draws.uniform(8e-3, 13e-3), draws.uniform(-0.0167, 0.0167)])
-        ),
+        offset_s=float(near if far is None else far),
+        offset_known=far is None,
         drift=float(draws.normal(0, 3e-5)),
         amplitude=amplitude,
         sway=sway,
         noise_px=float(draws.uniform(0.02, 0.1)),
         common_px=float(draws.uniform(0.0, 0.1)) if draws.random() < 0.5 else 0.0,
         drops=float(draws.choice([0.0, 0.0, 0.1])),
+        kind=str(draws.choice(list(KINDS), p=list(KINDS.values()))),
     )
 
 
@@ -180,14 +188,15 @@ def draw_anchor(scene: Scene, draws: np.random.Generator) -> Anchor:
     share = float(draws.choice([0.01, 0.02, 0.05]))
     left, right = (r / ROWS for r in scene.readout_s)
     offset_sigma = float(draws.choice([5e-5, 5e-4, 2e-3]))
+    offset = scene.offset_s + offset_sigma * draws.normal()
     return Anchor(
         left_row_time_s=left * (1 + share * draws.normal()),
         left_row_time_sigma_s=share * left,
         right_row_time_s=right * (1 + share * draws.normal()),
         right_row_time_sigma_s=share * right,
         row_time_source="led",
-        right_offset_s=scene.offset_s + offset_sigma * draws.normal(),
-        right_offset_sigma_s=offset_sigma,
+        right_offset_s=offset if scene.offset_known else 0.0,
+        right_offset_sigma_s=offset_sigma if scene.offset_known else np.inf,
         reference_row=0.0,
-        offset_source="calibration",
+        offset_source="calibration" if scene.offset_known else "unknown",
     )

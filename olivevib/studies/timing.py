@@ -3,35 +3,31 @@
 Each cell is a trial that is rendered (rolling shutters, distortion, compressed MJPEG), calibrated
 from its own rendered board and measured like any other; nothing of the truth is told but what a
 technician would know. Frequencies, offsets and amplitudes are drawn outside the zones in which
-nothing is claimed, beside some inside. A cell costs a minute or more, so each is kept in the folder
-``reports/benchmark/timing-cells`` as soon as it is measured, and a later run goes on from there.
+nothing is claimed, beside some inside. A cell costs a minute or more and is kept (studies.cells).
 """
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
-from olivevib import __version__, pipeline
-from olivevib.files.atomic import write_text_atomic
+from olivevib import pipeline
 from olivevib.pipeline.simulated import plan_of, truth_folder
 from olivevib.planning import Setup, outlook
 from olivevib.progress import Tick
 from olivevib.simulation import Clock, Optics, Phases, scenario, simulate
 from olivevib.simulation.scenarios import BoardPlan, CameraPlan, MarkerPlan, Scenario, Shaking
+from olivevib.studies import cells
 from olivevib.studies.study import Cell, Chart, Curve, Effort, Goal, Study, Table
 from olivevib.trial import Trial
 
 TRIALS = 60
-KEPT = Path("reports/benchmark/timing-cells")
 SECONDS = 9.0
 ROWS = 720
 LEAST_MM = {10: 1.3, 20: 0.7, 30: 0.5}
@@ -100,26 +96,9 @@ def draw(effort: Effort, number: int) -> Draw:
 
 def kept(one: Draw, tick: Tick) -> Outcome:
     """The cell from the folder of cells, else measured now and kept."""
-    name = f"{one.seed}-{one.f_hz:g}-{one.readout_ms}-{one.offset_ms:g}-{one.exposure_ms:.2f}.json"
-    path = KEPT / name
-    if path.is_file():
-        told = json.loads(path.read_text(encoding="utf-8"))
-        if told["version"] == __version__ and told["draw"] == asdict(one):
-            return _outcome_of(told["outcome"])
-    outcome = measured(one, tick)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    plain = {
-        k: None if isinstance(v, float) and math.isnan(v) else v for k, v in asdict(outcome).items()
-    }
-    whole = {"version": __version__, "draw": asdict(one), "outcome": plain}
-    write_text_atomic(path, json.dumps(whole, indent=1))
-    return outcome
-
-
-def _outcome_of(told: dict[str, Any]) -> Outcome:
-    """JSON knows no NaN."""
-    known: dict[str, Any] = {k: math.nan if v is None else v for k, v in told.items()}
-    return Outcome(**known)
+    name = f"{one.seed}-{one.f_hz:g}-{one.readout_ms}-{one.offset_ms:g}-{one.exposure_ms:.2f}"
+    found = cells.kept("timing", name, asdict(one), lambda: asdict(measured(one, tick)))
+    return Outcome(**found)
 
 
 def scene_of(one: Draw) -> Scenario:

@@ -18,6 +18,7 @@ CONFIRMED_LEAD = 25.0
 SUPPORTED_LEAD = 5.0
 CHI2_LIMIT = 1.5
 NOISE_LIMIT = 5.0  # measured noise over the localiser's above which nothing is confirmed
+BESIDE_LIMIT = 10.0  # sigmas of noise above which a second line near a steady one is believed
 LINE_EVIDENCE = 12.0  # over sway alone below which no line stands out
 AMPLITUDE_SHARE = 0.1  # sigma over amplitude above which a line is blind
 STEP_S = 5e-3  # cameras nearer than this to the same instant count as in step
@@ -30,7 +31,8 @@ SWAY_SHARE = 0.4  # over the knot spacing: half width of the sway's zone, Hz
 @dataclass(frozen=True)
 class Facts:
     """What the verdict rests on. noise_scale and chi2 as in MotionFit; amplitude_mm (3,) peak and
-    sigma of the strongest marker's fundamental; strength: log evidence over sway alone.
+    sigma of the strongest marker's fundamental; strength: log evidence over sway alone; beside as
+    in Pixels.
     """
 
     table: BranchTable
@@ -44,6 +46,7 @@ class Facts:
     amplitude_mm: Floats
     sigma_mm: Floats
     fast_hz_s: float = 0.0
+    beside: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -142,6 +145,8 @@ def _doubts(facts: Facts, settings: MotionSettings) -> list[str]:
         doubts.append(f"it leads by {lead:.1f} of the {CONFIRMED_LEAD:.0f} asked")
     if facts.chi2 > CHI2_LIMIT:
         doubts.append(f"the motion is not quite of this kind (chi2 {facts.chi2:.2f})")
+    if facts.beside > BESIDE_LIMIT:
+        doubts.append("a second line stands beside it: its speed may wander")
     if facts.noise_scale > NOISE_LIMIT:
         doubts.append(f"the pictures scatter {facts.noise_scale:.1f} times more than they should")
     low, high = settings.band_hz

@@ -42,6 +42,7 @@ from olivevib.reconstruction.motion.types import (
 )
 from olivevib.reconstruction.motion.wander import Growth, growth_of, pace_of, weigh_paces
 
+DRAWING_SHARE = 3e-3  # of a row time: a drawing keeps 0.3 % of the slant at which it was drawn
 WORSE = 1.3  # noise or chi2 above which a wandering speed is looked for
 
 
@@ -224,6 +225,7 @@ def finished(
         amplitude_mm=amplitude,
         sigma_mm=strongest.amplitude_sigma()[0, :3],
         fast_hz_s=fast,
+        beside=ready.pixels.beside if kind == "steady" else 0.0,
     )
     decision = decide(facts, ready.anchor, ready.settings)
     return _result(ready, model, best, facts, decision, (markers, timing, kind))
@@ -240,7 +242,7 @@ def _result(
     markers, covariance, kind = parts
     theta, row = best.theta, ready.observations.reference_row
     f = float(theta[0])
-    timing = timing_of(theta, row, covariance)
+    timing = timing_of(theta, row, _with_drawing(ready, covariance, theta))
     timing = replace(
         timing, row_time_keeps=keeps_branch(f, facts.rate_hz), offset_slip=not ready.offset_found
     )
@@ -271,6 +273,16 @@ def _result(
         growth=model.growth,
         amplitude_refused=refused,
     )
+
+
+def _with_drawing(ready: Prepared, covariance: Floats, theta: Floats) -> Floats:
+    """The covariance (5, 5) of TIMING with what fitted drawings may add to the row times."""
+    drawn = any(m.left.drawn is not None for m in ready.observations.markers)
+    share = DRAWING_SHARE if drawn else 0.0
+    more = np.concatenate(
+        [np.zeros(3), (share * theta[3:5]) ** 2 * (covariance[[3, 4], [3, 4]] > 0)]
+    )
+    return covariance + np.diag(more)
 
 
 def _px_per_mm(ready: Prepared) -> float:

@@ -21,6 +21,7 @@ SPACINGS_S = (0.4, 0.3, 0.2, 0.15, 0.1)  # of knots, longest first
 RISE = 1.05  # of the noise variance that a longer spacing may cost
 SLOW_HZ = 2.7  # a line that appears slower is left to the spline when its spacing is chosen
 OWN_FRAMES = 12.0  # frames that the localiser's own covariance counts for
+NEAR_HZ = 1.5  # of a line that is taken as steady: what stands beside it is its wandering
 SHARP = {"xatol": 1e-6}  # Hz: a cycle's phase over a minute to 0.4 mrad
 LEAST_FREE = 24  # degrees of freedom below which no noise is measured
 
@@ -28,7 +29,8 @@ LEAST_FREE = 24  # degrees of freedom below which no noise is measured
 @dataclass(frozen=True)
 class Pixels:
     """knot_s chosen; f_hz (F,) apparent frequencies with power (F,) log evidence; noise: for each
-    view (markers x 2) the covariance (2P, 2P) px² of a frame and its degrees of freedom.
+    view (markers x 2) the covariance (2P, 2P) px² of a frame and its degrees of freedom. beside: in
+    standard deviations of noise, the power of a second line near a first that was taken as steady.
     """
 
     knot_s: float
@@ -37,6 +39,7 @@ class Pixels:
     peaks_hz: tuple[float, ...]
     noise: tuple[tuple[Floats, float], ...]
     scale: float
+    beside: float = 0.0
 
     @property
     def learned(self) -> float:
@@ -80,19 +83,21 @@ def look(
         lines = [_without_sway(v, step) for v in views]
         power = np.sum([line_power(*line, f) for line in lines], axis=0)
         peaks = tuple(_sharpened(lines, peak, f[1] - f[0]) for peak in _peaks(f, power, 2.0 / span))
-        noise = tuple(
-            _noise(v, Q, _phase(v, peaks, phase), harmonics, size)
+        left = [
+            _left(v, Q, _phase(v, peaks, phase), harmonics, size)
             for v, (_, Q, _) in zip(views, lines, strict=True)
-        )
-        trials.append((step, power, peaks, noise))
+        ]
+        noise = tuple(_noise(v, *one) for v, one in zip(views, left, strict=True))
+        near = _beside(views, left, noise, f, peaks) if phase is None else 0.0
+        trials.append((step, power, peaks, noise, near))
     sizes = [_size(views, t[3]) for t in trials]
     if not sizes or not np.isfinite(sizes).any():
         raise ValueError(
             f"{rate:.1f} frames/s for {span:.1f} s are too few for a fit of the motion"
         )
     pick = next(k for k, s in enumerate(sizes) if s <= RISE * np.nanmin(sizes))
-    step, power, peaks, noise = trials[pick]
-    return Pixels(step, f, power, peaks, noise, float(np.sqrt(sizes[pick])))
+    step, power, peaks, noise, near = trials[pick]
+    return Pixels(step, f, power, peaks, noise, float(np.sqrt(sizes[pick])), near)
 
 
 def _without_sway(v: Sightings, step: float) -> tuple[Floats, Floats, Floats]:
@@ -161,14 +166,14 @@ def _phase(
     return np.asarray(2 * np.pi * peaks[0] * (t - t.mean()))
 
 
-def _noise(
+def _left(
     v: Sightings,
     Q: Floats,
     phase: Floats | None,
     harmonics: int,
     size: Callable[[Floats], Floats] | None,
-) -> tuple[Floats, float]:
-    """Covariance of a frame's pixels left by spline and lines, blended with the localiser's."""
+) -> tuple[Floats, Floats]:
+    """What spline and lines leave of a view's pixels (N, 2P), and their orthonormal basis."""
     n = v.row_zero_s.size
     columns = [Q]
     even = np.ones(n) if size is None else size(v.row_zero_s)
@@ -180,8 +185,12 @@ def _noise(
             columns += [line, lower[:, None] * line]
     basis = np.linalg.qr(np.column_stack(columns))[0]
     y = v.px.reshape(n, -1)
-    r = y - basis @ (basis.T @ y)
-    free = float(n - basis.shape[1])
+    return np.asarray(y - basis @ (basis.T @ y)), basis
+
+
+def _noise(v: Sightings, r: Floats, basis: Floats) -> tuple[Floats, float]:
+    """Covariance of a frame's pixels left by spline and lines, blended with the localiser's."""
+    free = float(len(r) - basis.shape[1])
     own = v.covariance_px2.mean(axis=0)
     if free < LEAST_FREE:
         return own, 0.0
@@ -189,6 +198,25 @@ def _noise(
     scale = float(np.trace(np.linalg.solve(own, seen)) / own.shape[0])
     share = OWN_FRAMES / (OWN_FRAMES + free)
     return share * scale * own + (1 - share) * seen, free
+
+
+def _beside(
+    views: list[Sightings],
+    left: list[tuple[Floats, Floats]],
+    noise: tuple[tuple[Floats, float], ...],
+    f: Floats,
+    peaks: tuple[float, ...],
+) -> float:
+    """The strongest line near the first peak in what it leaves, in sigmas of pure noise."""
+    if not peaks or peaks[0] < SLOW_HZ:
+        return 0.0
+    near = f[np.abs(f - peaks[0]) < NEAR_HZ]
+    power, freedom = np.zeros(near.size), 0
+    for v, (r, basis), (covariance, _) in zip(views, left, noise, strict=True):
+        W = np.linalg.inv(np.linalg.cholesky(covariance))
+        power += line_power(v.row_zero_s, basis, r @ W.T, near)
+        freedom += 2 * len(W)
+    return float((power.max() - freedom / 2) / np.sqrt(freedom / 2))
 
 
 def _size(views: list[Sightings], noise: tuple[tuple[Floats, float], ...]) -> float:
