@@ -25,7 +25,7 @@ def init(arguments: argparse.Namespace, console: Console) -> int:
 def new(arguments: argparse.Namespace, console: Console) -> int:
     """Make a trial from two recordings."""
     from olivevib import pipeline
-    from olivevib.trial.workspace import place_for_new
+    from olivevib.trial.workspace import find_preset, place_for_new
 
     left_row, right_row = values.row_times(arguments.row_time)
     plan = pipeline.NewTrial(
@@ -46,7 +46,7 @@ def new(arguments: argparse.Namespace, console: Console) -> int:
         right_stamps=arguments.right_stamps,
         accelerometer=arguments.accelerometer,
         accelerometer_marker=arguments.accelerometer_marker,
-        preset=_preset(arguments.preset),
+        preset=find_preset(arguments.preset, Path()) if arguments.preset else None,
         link=arguments.link,
     )
     folder = place_for_new(arguments.trial, Path())
@@ -58,12 +58,6 @@ def new(arguments: argparse.Namespace, console: Console) -> int:
     console.say(f"made {trial.folder}; describe it in {trial.folder / 'trial.toml'}")
     console.say(f"Next: olivevib run {arguments.trial}")
     return 0
-
-
-def _preset(name: str | None) -> str | None:
-    """The file of a preset: a name under presets/ of the workspace, or a path."""
-    kept = Path("presets") / f"{name}.toml"
-    return str(kept) if name and kept.is_file() else name
 
 
 def preset(arguments: argparse.Namespace, console: Console) -> int:

@@ -16,7 +16,7 @@ from olivevib.pipeline.capture.record import RECORD
 from olivevib.pipeline.recordings import SIDES, stamps_of
 from olivevib.progress import Tick, silent
 from olivevib.trial import Trial
-from olivevib.trial.camera_book import BOARD, CameraMode, Entry
+from olivevib.trial.camera_book import BOARD, CameraMode, Entry, remember
 
 MOST_FRAMES = 600
 
@@ -124,6 +124,18 @@ def board_row_times(trial: Trial) -> list[BoardRowTime]:
             "Wave the board for some seconds, tilting it; or use a lamp: olivevib rowtime --led HZ",
         )
     return found
+
+
+def keep_row_time(entry: Entry, workspace: Path | None) -> str:
+    """Write what was measured into the workspace's book of cameras; says where, or why not."""
+    mode = entry.mode
+    if not mode.camera:
+        return "Not kept: the recording does not say whose it is. Name the camera."
+    if not mode.fps:
+        return "Not kept: the recording does not say in which mode the camera ran."
+    if workspace is None:
+        return "Not kept: there is no workspace here (olivevib init makes one)."
+    return f"kept for {mode.camera} in {remember(workspace, entry)}; new trials of it will use it"
 
 
 def recorded_camera(video: Path) -> str | None:

@@ -38,6 +38,12 @@ def hidden_by(taken: Path, name: str, workspace: Path) -> Path | None:
     return other if there else None
 
 
+def find_preset(name: str, workspace: Path) -> str:
+    """The file of a preset: a name under ``presets/`` of the workspace, or a path as it is."""
+    kept = workspace / "presets" / f"{name}.toml"
+    return str(kept) if name and kept.is_file() else name
+
+
 def place_for_new(name: str, workspace: Path) -> Path:
     """Where a new trial goes: a bare name under ``trials/`` of a workspace, else the path given."""
     path = Path(name)

@@ -173,10 +173,10 @@ class OlivevibApp(App[None]):
             words = "Cancelled; finished work is kept. The same key goes on from there."
             self.say(words)
         elif ended.result is not None:
-            words, warned = ended.result.words, bool(ended.result.cautions)
-            self.say(words, warned)
-            if ended.result.opens is not None:
-                self.open(ended.result.opens)
+            result = ended.result
+            self.say(result.words, result.warns or bool(result.cautions))
+            if result.opens is not None:
+                self.open(result.opens)
 
     def say(self, words: str, warned: bool = False) -> None:
         """Say an outcome on the line of work of every screen, where it covers nothing."""

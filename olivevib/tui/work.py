@@ -18,11 +18,15 @@ KNOWN_AFTER_S = 1.0  # before that a rate is a guess
 
 @dataclass(frozen=True)
 class Result:
-    """What work left behind: a sentence with the next key, warnings, a trial to open."""
+    """What work left behind: a sentence with the next key, warnings, a trial to open.
+
+    warns: it needs a look, also without warnings of its own.
+    """
 
     words: str
     cautions: tuple[Caution, ...] = ()
     opens: Path | None = None
+    warns: bool = False
 
 
 @dataclass(frozen=True)

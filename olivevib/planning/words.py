@@ -1,0 +1,95 @@
+"""What a plan tells, for a person: one frequency in full, or the whole band as a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from olivevib.planning.outlook import BLURRED, SHARP, Outlook
+from olivevib.planning.setup import Setup
+from olivevib.planning.zones import Zone, zones
+
+WHOLE_BAND = (5.0, 45.0, 2.5)  # Hz: what is shown where no frequency was named
+
+
+def frequencies(one: float | None) -> list[float]:
+    """The frequency that was named, Hz; those of the whole band where none was."""
+    if one is not None:
+        return [one]
+    low, high, step = WHOLE_BAND
+    return [low + step * k for k in range(int((high - low) / step) + 1)]
+
+
+def one_words(setup: Setup, o: Outlook, told: Sequence[str], more: str = "") -> str:
+    """Everything of one frequency; told: the advice for the trial; more: how to change the plan."""
+    lines = [
+        f"{o.f_hz:g} Hz, {o.amplitude_mm:g} mm peak ({o.acceleration_m_s2:.1f} m/s²): {o.status}",
+        *(f"  {reason}" for reason in o.reasons),
+        f"  (planned: {setup.fps:g} frames/s, {setup.seconds:g} s, exposure "
+        f"{1e3 * setup.exposure_s:g} ms, markers of {setup.marker_mm:g} mm at "
+        f"{setup.distance_mm:g} mm, baseline {setup.baseline_mm:g} mm, focal length "
+        f"{setup.focal_px:g} px{more})",
+        "",
+        f"  marker in the picture          {setup.marker_px:.1f} px high",
+        f"  a plain spectrum shows it at   {o.seen_hz:.2f} Hz "
+        f"({o.seen_acceleration_m_s2:.1f} m/s²)",
+        f"  the same to the frames         {', '.join(f'{f:.2f}' for f in o.aliases_hz)} Hz",
+        f"  contrast between aliases       {o.contrast_px:.3f} px, expected evidence "
+        f"{o.evidence:.0f} (25 confirm)",
+        f"  least amplitude to confirm     {_mm(o.least_amplitude_mm)}",
+        f"  expected sigma of amplitude    {o.sigma_plane_mm:.3f} mm across, "
+        f"{o.sigma_depth_mm:.3f} mm in depth",
+        f"  false depth, frames as pairs   {_mm(o.false_depth_mm)} "
+        f"({o.false_depth_per_ms_mm:.2f} mm per ms out of step)",
+        f"  frequency x exposure           {o.blur:.3f} ({_blur(o.blur)})",
+    ]
+    if not setup.direct and setup.row_time_s > 0:
+        small, large = o.row_time_margin
+        more = "any" if math.isinf(large) else f"{100 * large:.0f} %"
+        lines.append(f"  the row time may be wrong by   -{100 * small:.0f} % or +{more}")
+    lines += ["", f"  zones to avoid                 {_zone_words(setup)}", ""]
+    return "\n".join([*lines, "For the trial:", *(f"  - {text}" for text in told)])
+
+
+def _mm(value: float) -> str:
+    if math.isnan(value):
+        return "not known (offset unknown)"
+    return "none suffices" if math.isinf(value) else f"{value:.2f} mm"
+
+
+def _blur(blur: float) -> str:
+    if blur <= SHARP:
+        return "sharp"
+    return "corrected by the localiser's gain" if blur <= BLURRED else "no amplitude"
+
+
+def _zone_words(setup: Setup) -> str:
+    found = zones_of(setup)
+    words = [f"{z.centre_hz:g} ± {z.half_hz:g}{' (blind)' * z.blind}" for z in found]
+    return f"{', '.join(words)} Hz" if words else "none"
+
+
+def zones_of(setup: Setup) -> tuple[Zone, ...]:
+    """The frequencies to avoid under this setup."""
+    if setup.direct:
+        return ()
+    band = setup.band_hz or (WHOLE_BAND[0], WHOLE_BAND[1])
+    return zones(setup.fps, setup.apart, setup.seconds, band, setup.row_time_s > 0)
+
+
+def table_words(setup: Setup, found: Sequence[Outlook]) -> str:
+    """A line a frequency."""
+    lines = [
+        f"{found[0].amplitude_mm:g} mm peak; markers {setup.marker_px:.1f} px high; zones to "
+        f"avoid: {_zone_words(setup)}",
+        "",
+        "    Hz  seen at  status       least mm  sigma mm  depth mm  false depth mm   m/s²",
+    ]
+    for o in found:
+        least = "-" if math.isinf(o.least_amplitude_mm) else f"{o.least_amplitude_mm:.2f}"
+        false = "-" if math.isnan(o.false_depth_mm) else f"{o.false_depth_mm:.2f}"
+        lines.append(
+            f"{o.f_hz:6.2f} {o.seen_hz:8.2f}  {o.status:12} {least:>8} {o.sigma_plane_mm:9.3f} "
+            f"{o.sigma_depth_mm:9.3f} {false:>15} {o.acceleration_m_s2:6.1f}"
+        )
+    return "\n".join(lines)
