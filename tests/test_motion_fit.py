@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pytest
@@ -115,6 +115,47 @@ def test_a_wandering_speed_is_followed():
     assert fit.chi2 < 1.4
 
 
+def test_a_small_line_that_wanders_is_not_confirmed_at_one_of_its_sides():
+    """Too small for its wandering to be followed: the line beside it says that it is not steady."""
+    s = scene(14.85, mm=0.4, kind="wandering", span_s=4.5)
+    _, fit = fitted(s)
+    assert fit.status is not LineStatus.CONFIRMED
+    _, still = fitted(replace(s, kind="steady"))
+    assert still.status is LineStatus.CONFIRMED
+
+
+@dataclass(frozen=True)
+class SpinningUp(Scene):
+    """A speed that rises all the time, by hz_s."""
+
+    hz_s: float = 2.0
+
+    def phase(self, t_s):
+        return 2 * np.pi * (self.f_hz * t_s + self.hz_s / 2 * (t_s - self.span_s / 2) ** 2)
+
+
+def spinning_up(hz_s):
+    s = scene(21.0)
+    return SpinningUp(**{f.name: getattr(s, f.name) for f in fields(s)}, hz_s=hz_s)
+
+
+def test_a_speed_that_rises_evenly_is_followed():
+    s = spinning_up(2.0)
+    _, fit = fitted(s)
+    assert fit.kind == "wandering"
+    assert abs(fit.f_hz - 21.0) < 0.05
+    at = np.linspace(0.4, 3.6, 200)
+    found = phase_of(fit, at - fit.shift_s)[1] / (2 * np.pi)
+    assert np.std(found - (21.0 + 2.0 * (at - 2.0))) < 0.02
+
+
+@pytest.mark.parametrize("hz_s", [6.0, 12.0])
+def test_a_speed_that_rises_too_fast_is_not_claimed(hz_s):
+    _, fit = fitted(spinning_up(hz_s))
+    assert fit.status is LineStatus.CHIRP
+    assert "Hz a second" in fit.reasons[0]
+
+
 def test_free_motion_claims_no_frequency():
     draws = np.random.default_rng(2)
     s = scene(mm=1e-6, sway=((1.3, orbit(draws, 6.0, 0.01)), (3.9, orbit(draws, 1.0, 0.002))))
@@ -128,7 +169,8 @@ def test_free_motion_claims_no_frequency():
     assert error[:, 2].std() < 0.4
 
 
-def test_the_study_counts_verdicts_against_truth():
+def test_the_study_counts_verdicts_against_truth(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     study = blind.run(Effort(share=0.0004, seed=3))
     assert sum(row[1] for row in study.tables[0].rows) == 4
     wrong = next(g for g in study.goals if g.quantity == "wrong branch among confirmed")

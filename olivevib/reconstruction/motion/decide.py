@@ -24,7 +24,7 @@ AMPLITUDE_SHARE = 0.1  # sigma over amplitude above which a line is blind
 STEP_S = 5e-3  # cameras nearer than this to the same instant count as in step
 NARROW_HZ = 0.3
 CHIRP_HZ_S = 0.5  # change of the apparent frequency that, left unexplained, is a chirp
-CHIRP_CHI2 = 3.0
+CHIRP_MISFIT = 25.0  # variance left over the localiser's that a changing speed must explain
 SWAY_SHARE = 0.4  # over the knot spacing: half width of the sway's zone, Hz
 
 
@@ -113,8 +113,9 @@ def _status(
     if rate > 2 * settings.band_hz[1]:
         why = f"{rate:.2f} frames/s exceed twice the band: no alias lies in it."
         return LineStatus.DIRECT, (why,)
-    if facts.fast_hz_s > CHIRP_HZ_S and facts.chi2 > CHIRP_CHI2:
-        return LineStatus.CHIRP, ("The speed changes too fast here; not resolved.",)
+    if facts.fast_hz_s > CHIRP_HZ_S and facts.chi2 * facts.noise_scale**2 > CHIRP_MISFIT:
+        why = f"The speed changes by up to {facts.fast_hz_s:.1f} Hz a second"
+        return LineStatus.CHIRP, (f"{why}: too fast to be resolved.",)
     like = zone(f, facts)
     if like:
         why = f"Near {f:.2f} Hz a line looks like {like} at {rate:.2f} frames/s"
@@ -190,6 +191,8 @@ def _advice(status: LineStatus, facts: Facts, anchor: Anchor) -> tuple[str, ...]
     if status is LineStatus.CONFIRMED:
         return ()
     out = []
+    if status is LineStatus.CHIRP:
+        out.append("Let the machine run at an even speed for ten seconds.")
     if not anchor.stamps_true:
         out.append("Keep the time stamps of the frames.")
     if np.isinf(anchor.left_row_time_sigma_s):

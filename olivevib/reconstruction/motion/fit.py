@@ -89,8 +89,8 @@ def fit_motion(
         peak = ready.pixels.peaks_hz[0]
         pace = pace_of(observations, knot, span, peak)
         grown = growth_of(observations, knot, span, peak)
+        fast = 0.0 if pace is None else pace.ridge.fastest_hz_s
         if pace is not None and pace.gain > max(WORSE, grown.gain):
-            fast = pace.ridge.fastest_hz_s
             again = prepare(observations, rig, clock, settings, pace.phase)
             rate, sigma = observations.frame_rate_hz, again.offset_sigma_s
             followed = weigh_paces(again.model, pace, rate, band_of(ready), sigma, tick)
