@@ -10,10 +10,12 @@ from pathlib import Path
 import pytest
 import tui_scene as scene
 from small_videos import make_video
+from test_row_time_verb import film
 from textual.widgets import DataTable, Input, Static
 from tui_app import press, screen_text, settle, started
 
 from olivevib.errors import InputError
+from olivevib.pipeline.machine import Check
 from olivevib.progress import Cancelled
 from olivevib.trial import Trial
 from olivevib.tui.screens.error import ErrorScreen
@@ -682,3 +684,76 @@ def test_the_cli_refuses_without_a_terminal(capsys):
 
 def test_input_errors_have_remedies():
     assert InputError("a", "b", "c").remedy == "c"
+
+
+# -- what is about the workspace, not one trial ---------------------------------------------------
+
+
+async def test_a_recording_is_planned(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "P")
+        assert "zones to avoid" in words(app, "#outlook-text")
+        assert "25.00" in words(app, "#outlook-text")  # a line of the whole band
+        for name, text in (("readout", "20"), ("offset", "10"), ("frequency", "25")):
+            app.screen.query_one(f"#{name}", Input).value = text
+        await press(pilot, "enter")
+        told = words(app, "#outlook-text")
+        assert "25 Hz, 3 mm peak (74.0 m/s²): confirmable" in told
+        assert "For the trial:" in told
+        app.screen.query_one("#distance", Input).value = "far"
+        await press(pilot, "enter")
+        assert "“distance, mm”: 'far' is no number" in words(app, "#outlook-text")
+
+
+async def test_this_machine_is_looked_at(workspace, monkeypatch):
+    checks = (
+        Check("codecs", "mjpeg", "ok", "reads webcams"),
+        Check("disk", "x", "missing", "full"),
+    )
+    monkeypatch.setattr("olivevib.tui.screens.machine.machine_checks", lambda folder: checks)
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "D")
+        assert "reads webcams" in screen_text(app)
+        assert "1 missing" in screen_text(app)
+
+
+@pytest.mark.slow
+async def test_a_row_time_is_measured_from_a_lamp_and_kept(workspace, tmp_path):
+    video = film(tmp_path)
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "W", "ctrl+s")
+        assert "recording of the lamp is not named" in words(app, ".dialog > Static")
+        await press(pilot, "escape")
+        for name, text in (("recording", str(video)), ("led", "500"), ("camera", "left cam")):
+            app.screen.query_one(f"#{name}", Input).value = text
+        await press(pilot, "ctrl+s")
+        told = words(app, "#found-text")
+        assert "row time 37.49" in told
+        assert "kept for left cam" in told
+        assert "left cam, 160 × 720" in told
+    assert "left cam" in (workspace / "cameras.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+async def test_all_trials_are_measured_by_workers_and_make_a_season(workspace):
+    for name in ("2026-11-20_T04", "2026-11-20_T05"):
+        shutil.rmtree(workspace / "trials" / name / ".olivevib", ignore_errors=True)
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "B", "w", "text:1", "enter", "r")
+        table = app.screen.query_one("#batch", DataTable)
+        results = [str(table.get_cell_at((k, 3))) for k in range(3)]
+        assert results == ["done", "done, with warnings", "failed"]
+        assert len(str(table.get_cell_at((0, 4)))) == 12
+        await press(pilot, "down", "down")
+        assert "is not a video" in words(app, "#why")
+        assert "2 of 3 trials done, 1 failed, 1 with warnings" in told(app)
+        await press(pilot, "space", "e")
+        assert "reports/season.html" in told(app)
+    assert (workspace / "reports" / "season.html").is_file()
+
+
+async def test_how_an_accelerometer_is_read_is_kept_for_other_trials(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "A", "enter")
+        assert "a new trial names it as its preset" in told(app)
+    assert (workspace / "presets" / "logger.toml").is_file()

@@ -12,11 +12,12 @@ import pytest
 import tui_scene as scene
 from pytest_textual_snapshot import SVGImageExtension
 from small_videos import make_video
-from textual.widgets import Input
+from textual.widgets import Input, Static
 from tui_app import press, settle, started
 from tui_live import board, live
 
 from olivevib.errors import Caution, InputError
+from olivevib.pipeline.machine import Check
 from olivevib.tui.capturing import Recorded, Recording, told_of
 from olivevib.tui.screens.live import LivePage
 from olivevib.tui.views.progress import Progress
@@ -39,7 +40,8 @@ WALK = (
     ("motion", "escape m plus"),
     ("comparison", "escape c"),
     ("calibration", "escape b"),
-    ("report", "escape e down"),
+    ("report", "escape e"),
+    ("export", "down down down"),
     ("settings", "escape s right_square_bracket right_square_bracket"),
     ("edit", "enter"),
     ("pictures", "escape escape k"),
@@ -47,8 +49,22 @@ WALK = (
     ("spectrogram", "p escape g"),
     ("phases", "escape m p"),
     ("form", "escape escape escape n T 0 7"),
-    ("choose", "tab tab tab tab tab ctrl+o"),
+    ("form_wrong", "tab x enter"),
+    ("choose", "tab tab tab ctrl+o"),
     ("capture", "escape escape c ctrl+r"),
+    ("plan", "escape P"),
+    ("plan_one", "tab tab tab 2 5 enter"),
+    ("batch", "escape B"),
+    ("row_time", "escape W"),
+    ("machine", "escape D"),
+    ("outcome", "escape enter A enter"),
+)
+
+MACHINE = (
+    Check("versions", "python", "ok", "3.12.1 (3.11 or newer is needed)"),
+    Check("extras", "textual_serve", "note", "optional: needed only for the app in a browser"),
+    Check("cameras", "0: /dev/video0", "ok", "Webcam, 30.0 frames/s, manual exposure holds"),
+    Check("disk", "/home/ana/olive", "missing", "0 GB free: about 1 minutes of two MJPEG webcams"),
 )
 
 
@@ -68,6 +84,8 @@ def workspace(made, tmp_path, monkeypatch) -> Path:
     shutil.copytree(made, tmp_path / "olive")
     monkeypatch.chdir(tmp_path / "olive")
     monkeypatch.setattr("olivevib.tui.screens.capture.camera_lines", tuple)
+    monkeypatch.setattr("olivevib.tui.screens.machine.machine_checks", lambda folder: MACHINE)
+    monkeypatch.setattr("olivevib.batch.cores", lambda: 2)
     return Path()
 
 
@@ -162,3 +180,23 @@ async def test_sunlight_and_no_colour(svg, workspace, monkeypatch):
         if await taken(app, pilot) != svg(name="without colour"):
             changed.append("without colour")
     assert not changed
+
+
+async def picking(app, pilot, workspace) -> None:
+    """The picker on a fixed folder, narrowed by two letters."""
+    folder = Path("raw")
+    (folder / "calibration").mkdir(parents=True)
+    (folder / "left").mkdir()
+    (folder / "left" / "1.png").write_bytes(b"x")
+    for name, size in (("left.mkv", 12_345_678), ("right.mkv", 12_000_000), ("logger.csv", 900)):
+        (folder / name).write_bytes(bytes(size // 1000))
+    app.keep(folder=str(folder))
+    await press(pilot, "n", "tab", "ctrl+o", "l", "e")
+    app.screen.query_one("#here", Static).update("/home/ana/olive/raw")
+
+
+@pytest.mark.parametrize("size", SIZES, ids=["120x40", "80x24"])
+async def test_picking_a_file_looks_as_it_did(svg, workspace, size):
+    async with started(workspace, size) as (app, pilot):
+        await picking(app, pilot, workspace)
+        assert await taken(app, pilot) == svg(name=name_of("pick", size))

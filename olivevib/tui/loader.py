@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from olivevib.detection import DetectionSettings
     from olivevib.geometry import StereoRig
     from olivevib.pipeline.export_preview import ExportPreview
+    from olivevib.pipeline.machine import Check
     from olivevib.reconstruction import Trajectory
     from olivevib.trial import Trial
     from olivevib.trial.quality import StageLine
@@ -304,6 +305,24 @@ def result_stamps(folders: Iterable[Path]) -> tuple[tuple[str, int], ...]:
             with suppress(OSError):
                 found.append((str(path), path.stat().st_mtime_ns))
     return tuple(sorted(found))
+
+
+def machine_checks(workspace: Path) -> tuple[Check, ...]:
+    """What ``olivevib doctor`` finds; every camera runs for a second."""
+    from olivevib.pipeline.machine import examine
+
+    return tuple(examine(workspace))
+
+
+def book_lines(workspace: Path) -> tuple[str, ...]:
+    """The workspace's book of cameras, a line a camera and mode; raises InputError."""
+    from olivevib.trial.camera_book import read_book
+
+    return tuple(
+        f"{e.mode.camera}, {e.mode.size_px[0]} × {e.mode.size_px[1]} at {e.mode.fps:g} frames/s: "
+        f"{e.row_time_us:.3f} ± {e.sigma_us:.3f} µs a row ({e.source})"
+        for e in read_book(workspace)
+    )
 
 
 def settings_now(folder: Path) -> DetectionSettings:

@@ -103,6 +103,7 @@ def plan_of(values: Mapping[str, str]) -> NewTrial:
     """
     from olivevib import values as typed
     from olivevib.pipeline import NewTrial
+    from olivevib.trial.workspace import find_preset
 
     said = {name: text.strip() for name, text in values.items() if text.strip()}
     left_row, right_row = _read(said, "row_time", typed.row_times) or (None, None)
@@ -124,7 +125,7 @@ def plan_of(values: Mapping[str, str]) -> NewTrial:
         right_stamps=said.get("right_stamps"),
         accelerometer=said.get("accelerometer"),
         accelerometer_marker=_whole(said, "accelerometer_marker"),
-        preset=said.get("preset"),
+        preset=find_preset(said["preset"], Path()) if "preset" in said else None,
         link=said.get("link", "no").lower() in ("yes", "y", "true", "1"),
     )
 

@@ -22,10 +22,25 @@ PAGES = {
 }
 
 
+TOOLS = {
+    "planning": "PlanningPage",
+    "batch": "BatchPage",
+    "row_time": "RowTimePage",
+    "machine": "MachinePage",
+}  # about the workspace, not one trial
+
+
+def make_tool(name: str, workspace: Path) -> Page:
+    """The page ``name`` of the workspace."""
+    module = import_module(f"olivevib.tui.screens.{name}")
+    page: Page = getattr(module, TOOLS[name])(workspace)
+    return page
+
+
 def load_pages() -> None:
     """Import every page, in whatever thread this is called in."""
     modules = {place.split(":")[0] for place in PAGES.values()}
-    for module in sorted({*modules, "new_trial", "capture", "live"}):
+    for module in sorted({*modules, "new_trial", "capture", "live", *TOOLS}):
         import_module(f"olivevib.tui.screens.{module}")
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
-from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
@@ -14,18 +12,20 @@ from textual.widgets import Button, Input, Static
 
 from olivevib.errors import OlivevibError
 from olivevib.tui.capturing import FIELDS, REHEARSAL, Recording, told_of
+from olivevib.tui.form_words import in_form_words
 from olivevib.tui.loader import CameraLine, camera_lines, guarded
-from olivevib.tui.plan import free_name
-from olivevib.tui.screens.choose import ChooseScreen
-from olivevib.tui.screens.page import Help, Jump, Page
+from olivevib.tui.plan import FieldError, free_name
+from olivevib.tui.screens.form_page import FormPage
+from olivevib.tui.screens.page import Help, Jump
 from olivevib.tui.views.cameras import cameras_text
-from olivevib.tui.widgets.form import form_rows, form_values_of
+from olivevib.tui.widgets.form import form_rows
 
 
-class CapturePage(Page):
+class CapturePage(FormPage):
     """The form of ``olivevib capture``."""
 
     NAME = "capture"
+    FIELDS = FIELDS
     HELP_TEXT = Help(
         "Two cameras at this computer, or two streams. What a camera sends is recorded as it is, "
         "with a time stamp and a checksum for every picture; nothing is recorded before you press "
@@ -38,7 +38,6 @@ class CapturePage(Page):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("ctrl+s", "run", "Run the cameras"),
         Binding("ctrl+r", "rehearse", "Rehearse"),
-        Binding("ctrl+o", "pick", "Choose", show=False),
     ]
 
     def __init__(self, workspace: Path, trial: str = "") -> None:
@@ -73,41 +72,12 @@ class CapturePage(Page):
                 if len(value) > 1 and not field.value:
                     field.value = str(number)
 
-    @on(Input.Submitted)
-    def _submitted(self) -> None:
-        """Enter goes to the next line."""
-        self.focus_next(Input)
-
-    def action_pick(self) -> None:
-        """Choose the value of the field with the cursor."""
-        self._choose((self.focused.id or "") if self.focused else "")
-
-    @on(Button.Pressed)
-    def _pressed(self, event: Button.Pressed) -> None:
-        name = event.button.id or ""
-        if name == "run":
-            self.action_run()
-        else:
-            self._choose(name.removeprefix("pick-"))
-
-    def _choose(self, name: str) -> None:
-        field = next((f for f in FIELDS if f.name == name), None)
-        if field is not None:
-            value = self.query_one(f"#{name}", Input).value
-            screen = ChooseScreen(field.label, value, field.choices)
-            self.app.push_screen(screen, partial(self._chosen, name))
-
-    def _chosen(self, name: str, text: str | None) -> None:
-        if text is not None:
-            field = self.query_one(f"#{name}", Input)
-            field.value = text
-            field.focus()
-
     def action_run(self) -> None:
         """Open both cameras and show what they see; nothing is recorded yet."""
-        told = guarded(lambda: told_of(form_values_of(self, FIELDS)))
+        told = guarded(lambda: told_of(self.values))
         if isinstance(told, OlivevibError):
-            self.olive.show_error(told)
+            field = told.field if isinstance(told, FieldError) else None
+            self.olive.show_error(in_form_words(told, FIELDS, field))
         elif self.olive.is_free():
             from olivevib.tui.screens.live import LivePage
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
@@ -26,25 +25,26 @@ from olivevib.tui.look import Look, look_at
 from olivevib.tui.plan import (
     FIELDS,
     PATHS,
+    Field,
     free_name,
     guesses,
     record_of,
     trial_name,
 )
-from olivevib.tui.screens.choose import ChooseScreen
-from olivevib.tui.screens.page import Help, Jump, Page
-from olivevib.tui.screens.pick import PickScreen
+from olivevib.tui.screens.form_page import FormPage
+from olivevib.tui.screens.page import Help, Jump
 from olivevib.tui.views.picture import Window
-from olivevib.tui.widgets.form import form_rows, form_values_of
+from olivevib.tui.widgets.form import form_rows
 from olivevib.tui.widgets.picture import Picture
 
 SHOWN = ("left", "right")
 
 
-class NewTrialPage(Page):
+class NewTrialPage(FormPage):
     """The form of ``olivevib new``."""
 
     NAME = "new trial"
+    FIELDS = FIELDS
     HELP_TEXT = Help(
         "Two recordings, and either two recordings of the calibration board with its description "
         "or the rig of an earlier calibration. Naming the left side fills in what lies beside it; "
@@ -58,7 +58,6 @@ class NewTrialPage(Page):
     )
     JUMPS = (Jump("f", "#form"),)
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("ctrl+o", "pick", "Pick, choose"),
         Binding("ctrl+s", "make", "Make the trial"),
     ]
 
@@ -125,73 +124,19 @@ class NewTrialPage(Page):
         name.value = free_name(folder.name for folder in self.olive.trials)
         name.focus()
 
-    @property
-    def values(self) -> dict[str, str]:
-        """What has been typed."""
-        return form_values_of(self, FIELDS)
+    # -- lines ----------------------------------------------------------------------------------
 
-    # -- picking --------------------------------------------------------------------------------
+    def offered(self, field: Field) -> tuple[str, ...]:
+        """What trials here said before, then what is usual."""
+        return tuple(dict.fromkeys((*self._used.get(field.name, ()), *field.choices)))
 
-    def action_pick(self) -> None:
-        """Pick the file, or choose the value, of the field with the cursor."""
-        name = (self.focused.id or "") if self.focused else ""
-        if any(field.name == name for field in FIELDS):
-            self._pick(name)
-
-    @on(Button.Pressed)
-    def _pressed(self, event: Button.Pressed) -> None:
-        name = (event.button.id or "").removeprefix("pick-")
-        if name == "make":
-            self.action_make()
-        else:
-            self._pick(name)
-
-    def _pick(self, name: str) -> None:
-        field = next(f for f in FIELDS if f.name == name)
-        if field.path:
-            self.app.push_screen(
-                PickScreen(field.label, self._start()), partial(self._picked, name)
-            )
-        else:
-            value = self.values[name]
-            choices = tuple(dict.fromkeys((*self._used.get(name, ()), *field.choices)))
-            self.app.push_screen(
-                ChooseScreen(field.label, value, choices), partial(self._chosen, name)
-            )
-
-    def _chosen(self, name: str, text: str | None) -> None:
-        if text is not None:
-            field = self.query_one(f"#{name}", Input)
-            field.value = text
-            field.focus()
-
-    def _start(self) -> Path:
-        """Where to begin: beside what was named, else where a file was last picked, else here."""
+    def start_folder(self) -> Path:
+        """Beside what was named, else where a file was last picked, else here."""
         named = [Path(self.values[p]).parent for p in PATHS if self.values[p]]
-        last = self.olive.kept.folder
-        places = [*named[:1], *([Path(last)] if last else [])]
-        return next((place for place in places if place.is_dir()), self.folder)
+        return named[0] if named and named[0].is_dir() else super().start_folder()
 
-    def _picked(self, name: str, path: Path | None) -> None:
-        if path is not None:
-            self.olive.keep(folder=str(path.parent))
-            field = self.query_one(f"#{name}", Input)
-            field.value = str(path)
-            field.focus()
-            self._named(name)
-
-    @on(Input.Submitted)
-    def _submitted(self, event: Input.Submitted) -> None:
-        """Enter goes to the next line."""
-        self._named(event.input.id or "")
-        self.focus_next(Input)
-
-    @on(Input.Blurred)
-    def _left_field(self, event: Input.Blurred) -> None:
-        self._named(event.input.id or "")
-
-    def _named(self, name: str) -> None:
-        """A path was named: fill in its neighbours, show first frames."""
+    def changed(self, name: str) -> None:
+        """A path was named: fill in its neighbours, show first frames; look at the whole form."""
         text = self.values.get(name, "").strip()
         if name in PATHS and text and Path(text).exists():
             for other, found in guesses(name, Path(text), self.values).items():

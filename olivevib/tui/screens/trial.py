@@ -13,7 +13,7 @@ from textual.containers import Horizontal, VerticalScroll
 from textual.coordinate import Coordinate
 from textual.widgets import DataTable, Static
 
-from olivevib.tui import jobs
+from olivevib.tui import jobs, tool_jobs
 from olivevib.tui.harmless import harmless, plain
 from olivevib.tui.loader import STAGE_NAMES, TrialFacts, result_stamps, trial_facts
 from olivevib.tui.screens.edit import EditScreen
@@ -67,6 +67,8 @@ class TrialPage(Page):
         Binding("c", "page('compare')", "Compare with accelerometer", show=False),
         Binding("k", "page('pictures')", "Pictures with markers", show=False),
         Binding("x", "check", "Check every file", show=False),
+        Binding("A", "preset", "Keep how the accelerometer is read", show=False),
+        Binding("W", "row_time", "Row times that the waved board showed", show=False),
     ]
 
     _stamps: tuple[tuple[str, int], ...] = ()
@@ -206,6 +208,21 @@ class TrialPage(Page):
     def action_check(self) -> None:
         """Read every file from end to end."""
         self.olive.start(jobs.check_trial(self.folder))
+
+    def action_preset(self) -> None:
+        """Keep how this trial's accelerometer file is read, for other trials."""
+        hint = "a name, letters, digits, - and _; a new trial takes it as its preset"
+        self.app.push_screen(EditScreen("keep as preset", hint, "logger"), self._named)
+
+    def _named(self, name: str | None) -> None:
+        if name is not None:
+            self.olive.start(tool_jobs.keep_preset(self.folder, name, self.olive.workspace))
+
+    def action_row_time(self) -> None:
+        """Measure the row times of this trial's cameras."""
+        from olivevib.tui.screens.row_time import RowTimePage
+
+        self.app.push_screen(RowTimePage(self.olive.workspace, self.folder.name))
 
     def action_page(self, name: str) -> None:
         """Show another page of this trial."""

@@ -17,7 +17,7 @@ from textual.worker import get_current_worker
 
 from olivevib.tui import jobs
 from olivevib.tui.loader import STAGE_NAMES, TrialRow, trial_folders, trial_row
-from olivevib.tui.screens import load_pages
+from olivevib.tui.screens import load_pages, make_tool
 from olivevib.tui.screens.edit import EditScreen
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.views.trial_list import columns_of, empty_text, matching, trial_cells, why_text
@@ -56,6 +56,10 @@ class TrialsPage(Page):
         Binding("d", "archive", "Archive, or take back", show=False),
         Binding("h", "archived", "Show archived trials too", show=False),
         Binding("f5", "reload", "Read again", show=False),
+        Binding("P", "tool('planning')", "Plan a recording", show=False),
+        Binding("B", "tool('batch')", "Run many trials, season report", show=False),
+        Binding("W", "tool('row_time')", "Row time of a camera", show=False),
+        Binding("D", "tool('machine')", "What works on this machine", show=False),
     ]
 
     class RowRead(Message):
@@ -228,6 +232,10 @@ class TrialsPage(Page):
     def action_demo(self) -> None:
         """Make a simulated trial with known truth."""
         self.olive.start(jobs.make_demo(self.folder))
+
+    def action_tool(self, name: str) -> None:
+        """Show a page about the workspace."""
+        self.app.push_screen(make_tool(name, self.folder))
 
     def action_new(self) -> None:
         """Make a new trial from recordings."""

@@ -1,0 +1,74 @@
+"""What works on this computer: versions, codecs, cameras, disk, terminal."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.widgets import DataTable
+
+from olivevib.tui.harmless import plain
+from olivevib.tui.loader import machine_checks
+from olivevib.tui.screens.page import Help, Jump, Page
+from olivevib.tui.views.tables import meaning
+
+STYLES = {"ok": "good", "note": "warn", "missing": "bad"}
+
+
+class MachinePage(Page):
+    """The checks of ``olivevib doctor``."""
+
+    NAME = "this machine"
+    HELP_TEXT = Help(
+        "Versions, codecs, cameras with their true frame rate, disk, cores and terminal. Every "
+        "camera runs for a second; its manual settings are tried and put back. note: works, but "
+        "read it. missing: something that is needed is not here.",
+        "Both cameras at 30 frames/s or more, manual exposure that holds, room for the day: two "
+        "720p webcams write about 0.4 GB a minute.",
+    )
+    JUMPS = (Jump("c", "#checks"),)
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("f5", "reload", "Look again")]
+
+    def body(self) -> ComposeResult:
+        """One table."""
+        yield DataTable(id="checks", classes="pane", cursor_type="row")
+
+    def on_mount(self) -> None:
+        """Start in the table."""
+        table = self.query_one("#checks", DataTable)
+        table.border_title = "This machine"
+        table.border_subtitle = "looking: every camera runs for a second …"
+        table.add_columns("of", "what", "state", "words")
+        table.focus()
+
+    def read(self) -> object:
+        """Look at the machine."""
+        return machine_checks(self.folder)
+
+    def show(self, value: object) -> None:
+        """One line a check; what is missing first said below."""
+        if not isinstance(value, tuple):
+            return
+        self._checks = value
+        table = self.query_one("#checks", DataTable)
+        table.clear()
+        for check in value:
+            style = meaning(self.olive.palette, STYLES.get(check.state))
+            cells = (
+                plain(check.group, 10),
+                plain(check.what, 30),
+                plain(check.state, 8, str(style)),
+            )
+            table.add_row(*cells, plain(check.words, 160))
+        missing = sum(check.state == "missing" for check in value)
+        told = f"{missing} missing" if missing else "everything that is needed is here"
+        table.border_subtitle = told
+
+    def recolour(self) -> None:
+        """Draw again in the new theme."""
+        self.show(getattr(self, "_checks", None))
+
+    def action_reload(self) -> None:
+        """Look again."""
+        self.reload()
