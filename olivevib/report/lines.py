@@ -24,9 +24,15 @@ OPEN = (LineStatus.AMBIGUOUS, LineStatus.ALIASED)
 MOST = 4  # candidates that are named one by one
 
 
-def candidates_text(candidates_hz: Sequence[float]) -> str:
-    """``5.00 or 25.00 or 35.00 Hz``; long lists are cut with their count and their end."""
+def candidates_text(candidates_hz: Sequence[float], chance: Sequence[float] = ()) -> str:
+    """``5.00 or 25.00 or 35.00 Hz``; long lists are cut with their count and their end.
+
+    chance: how probable each is, where that can be said: ``5.00 (12 %) or 25.00 (88 %) Hz``.
+    """
     listed = [plain(f, 2) for f in candidates_hz[:MOST]]
+    if len(chance) == len(candidates_hz):
+        pairs = zip(listed, chance, strict=False)
+        listed = [f"{text} ({100 * p:.2g}\u00a0%)" for text, p in pairs]
     more = len(candidates_hz) - len(listed)
     if more:
         listed.append(f"{more} more up to {plain(candidates_hz[-1], 2)}")

@@ -12,6 +12,7 @@ from olivevib.report import figures
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
 from olivevib.report.lines import KNOWN, OPEN
+from olivevib.report.plates_together import Job, body_jobs, response_jobs
 from olivevib.report.words import number
 from olivevib.vibration import Spectrum
 
@@ -28,9 +29,6 @@ class Plate:
     section: str
     svg: str
     caption: str
-
-
-_Job = tuple[str, str, Callable[[], str]]  # section, caption, what draws it
 
 
 def plates(content: ReportContent, tick: Tick = silent) -> list[Plate]:
@@ -62,7 +60,7 @@ def seen_ids(content: ReportContent) -> list[int]:
     )
 
 
-def _space(content: ReportContent) -> Iterator[_Job]:
+def _space(content: ReportContent) -> Iterator[Job]:
     path, names, ids = content.trajectory, content.names(), seen_ids(content)
     rig, lines = content.rig, content.lines()
     if rig is not None:
@@ -87,6 +85,7 @@ def _space(content: ReportContent) -> Iterator[_Job]:
     for group in _groups(ids, figures.MOST_ACROSS):
         caption = _once(_ORBITS.format(reach=number(reach, 3)), group, ids)
         yield ("orbits", caption, _bound(figures.orbits, path, names, group, reach, lines))
+    yield from body_jobs(content, ranked(content, ids))
     pairs = figures.pair_distances(path)
     if pairs:
         yield ("distances", _DISTANCES, lambda: figures.distances(path, pairs, names))
@@ -125,7 +124,7 @@ def ranked(content: ReportContent, ids: Sequence[int]) -> list[int]:
     return sorted(ids, key=lambda i: -size(i))
 
 
-def _changing(content: ReportContent, most: Sequence[int]) -> Iterator[_Job]:
+def _changing(content: ReportContent, most: Sequence[int]) -> Iterator[Job]:
     """The spectrograms of the markers that move most."""
     path, half, names = content.trajectory, content.half_rate_hz, content.names()
     assert path is not None
@@ -139,7 +138,7 @@ def _changing(content: ReportContent, most: Sequence[int]) -> Iterator[_Job]:
         )
 
 
-def _spectra(content: ReportContent) -> Iterator[_Job]:
+def _spectra(content: ReportContent) -> Iterator[Job]:
     spectrum, names, half = content.displacement, content.names(), content.half_rate_hz
     fold = content.fold_hz
     if spectrum is None or not spectrum.ids.size:
@@ -162,6 +161,7 @@ def _spectra(content: ReportContent) -> Iterator[_Job]:
     if ratios is not None:
         job = _bound(figures.transmissibilities, ratios.ratios, names, ratios.reference)
         yield ("transmissibility", _RATIOS, job)
+    yield from response_jobs(content)
     if content.decays:
         yield ("decay", _DECAY, _bound(figures.decays, content.decays, names))
 
@@ -185,7 +185,7 @@ def _window_words(s: Spectrum, half_hz: float) -> str:
     )
 
 
-def _quality(content: ReportContent) -> Iterator[_Job]:
+def _quality(content: ReportContent) -> Iterator[Job]:
     path, names, view, rig = (
         content.trajectory, content.names(), content.calibration, content.rig,
     )  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from olivevib.comparison import Verdict
+from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
 from olivevib.report.lines import MEANING, MOST, OPEN, candidates_text, describe
 from olivevib.report.tables import candidate_accelerations
@@ -24,9 +25,37 @@ _AGREEMENT = {
 }
 
 
-def verdict(content: ReportContent) -> tuple[str, str, str]:
-    """Three sentences; each says what is not known rather than leaving it out."""
-    return _seen(content), _vibration(content), _trust(content)
+def verdict(content: ReportContent) -> tuple[str, ...]:
+    """Three sentences; each says what is not known rather than leaving it out.
+
+    Where a stage has failed, or what is shown is not of the trial as it is now, that comes first.
+    """
+    told = (_seen(content), _vibration(content), _trust(content))
+    trouble = _trouble(content)
+    return (trouble, *told) if trouble else told
+
+
+def _trouble(content: ReportContent) -> str:
+    """What has failed, cannot be read or is out of date; empty where all is in order."""
+    parts = []
+    unread = sum(c.code == "file-damaged" for c in content.cautions)
+    if unread:
+        parts.append(f"{count(unread, 'file')} of this trial cannot be read and is left out below")
+    stages = content.summary.get("stages") or {}
+    for state, words in _STATES.items():
+        found = [name for name, told in stages.items() if (told or {}).get("state") == state]
+        if found:
+            reason = clean((stages[found[0]] or {}).get("reason") or "", 300)
+            parts.append(f"{' and '.join(found)} {words}" + (f" ({reason})" if reason else ""))
+    return f"Mind this first: {'; '.join(parts)}." if parts else ""
+
+
+_STATES = {
+    "failed": "failed",
+    "blocked": "could not run",
+    "stale": "is not up to date: what is shown was made from other files or settings",
+    "missing": "has not run",
+}
 
 
 def _seen(content: ReportContent) -> str:
@@ -76,7 +105,7 @@ def _vibration(content: ReportContent) -> str:
     size = measure(line.amplitude[axis], "mm", line.amplitude_sigma[axis])
     moves = f"by {size} (peak) along {'xyz'[axis]}"
     if line.status in OPEN and line.candidates_hz:
-        either = candidates_text(line.candidates_hz)
+        either = candidates_text(line.candidates_hz, line.probabilities)
         rms = candidate_accelerations(content, marker_id)[:MOST]
         shake = " or ".join(number(a, 3) for _, a, _ in rms)
         return (
@@ -123,5 +152,10 @@ def _trust(content: ReportContent) -> str:
         verdicts = dict.fromkeys(c.verdict for c in content.comparisons)
         parts.append(", ".join(_AGREEMENT[v] for v in verdicts))
     n = len(content.cautions)
-    parts.append("no warning was raised" if n == 0 else f"{count(n, 'warning')} to read below")
+    if n:
+        parts.append(f"{count(n, 'warning')} to read below")
+    elif _trouble(content):
+        parts.append("what did not run could raise no warning")
+    else:
+        parts.append("no warning was raised")
     return "; ".join(parts) + "."

@@ -15,6 +15,13 @@ from olivevib.report.figures.sigma import sigmas
 from olivevib.report.figures.sigma_map import SigmaMap, sigma_map, sigma_maps
 from olivevib.report.figures.spectra import amplitude_spectra, power_spectra, total_spectra
 from olivevib.report.figures.spectrogram import Spectrogram, spectrogram, spectrograms
+from olivevib.report.figures.together import (
+    deflection,
+    responses,
+    rotations,
+    shown_responses,
+    turns_of,
+)
 from olivevib.report.figures.transmissibility import transmissibilities
 from olivevib.report.figures.visibility import strips, visibility
 
@@ -28,6 +35,7 @@ __all__ = [
     "boxes",
     "close_window",
     "decays",
+    "deflection",
     "distances",
     "frequencies",
     "holdout",
@@ -37,7 +45,10 @@ __all__ = [
     "pair_distances",
     "power_spectra",
     "residual_map",
+    "responses",
+    "rotations",
     "scene",
+    "shown_responses",
     "sigma_map",
     "sigma_maps",
     "sigmas",
@@ -47,6 +58,7 @@ __all__ = [
     "time_series",
     "total_spectra",
     "transmissibilities",
+    "turns_of",
     "visibility",
     "whole",
 ]
