@@ -23,10 +23,12 @@ from olivevib.pipeline.marker_views import marker_views
 from olivevib.pipeline.motions import body_point, marker_motion
 from olivevib.progress import Tick, silent
 from olivevib.reconstruction import Trajectory
+from olivevib.reconstruction.continuous import interval_s
 from olivevib.signals import Samples
 from olivevib.trial import Trial
 from olivevib.trial.records.comparison import comparison_file
 from olivevib.trial.settings import Accelerometer
+from olivevib.vibration.clock import between
 
 
 def compare(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
@@ -100,6 +102,8 @@ def compare_sensor(
     views: tuple[View, ...] | None
     if trajectory.method == "continuous":  # the fit has given back what the exposure took
         settings, views = ComparisonSettings(), marker_views(trial, trajectory, marker)
+        fit = trial.reconstruction.motion if trial.reconstruction else None
+        point = point if fit is None else between(point, *interval_s(fit))
     else:
         exposure_s = (trial.settings.cameras.left.exposure_ms or 0.0) * 1e-3
         settings, views = ComparisonSettings(exposure_s=exposure_s), None
