@@ -22,6 +22,7 @@ RISE = 1.05  # of the noise variance that a longer spacing may cost
 SLOW_HZ = 2.7  # a line that appears slower is left to the spline when its spacing is chosen
 OWN_FRAMES = 12.0  # frames that the localiser's own covariance counts for
 NEAR_HZ = 1.5  # of a line that is taken as steady: what stands beside it is its wandering
+LEAST_BESIDE = 1e-3  # of the first line's power that counts
 SHARP = {"xatol": 1e-6}  # Hz: a cycle's phase over a minute to 0.4 mrad
 LEAST_FREE = 24  # degrees of freedom below which no noise is measured
 
@@ -88,7 +89,8 @@ def look(
             for v, (_, Q, _) in zip(views, lines, strict=True)
         ]
         noise = tuple(_noise(v, *one) for v, one in zip(views, left, strict=True))
-        near = _beside(views, left, noise, f, peaks) if phase is None else 0.0
+        first = (peaks[0], float(power.max())) if peaks and phase is None else (0.0, 0.0)
+        near = _beside(views, left, noise, f, first)
         trials.append((step, power, peaks, noise, near))
     sizes = [_size(views, t[3]) for t in trials]
     if not sizes or not np.isfinite(sizes).any():
@@ -205,17 +207,26 @@ def _beside(
     left: list[tuple[Floats, Floats]],
     noise: tuple[tuple[Floats, float], ...],
     f: Floats,
-    peaks: tuple[float, ...],
+    first: tuple[float, float],
 ) -> float:
-    """The strongest line near the first peak in what it leaves, in sigmas of pure noise."""
-    if not peaks or peaks[0] < SLOW_HZ:
+    """The strongest line near the first (Hz, power) in what it leaves, in sigmas of pure noise.
+
+    0 where it has less than a thousandth of the first one's power: sway and turns of a marker that
+    is seen very sharply leave as much.
+    """
+    peak_hz, peak_power = first
+    if peak_hz < SLOW_HZ:
         return 0.0
-    near = f[np.abs(f - peaks[0]) < NEAR_HZ]
-    power, freedom = np.zeros(near.size), 0
+    near = f[np.abs(f - peak_hz) < NEAR_HZ]
+    power, own, freedom = np.zeros(near.size), np.zeros(near.size), 0
     for v, (r, basis), (covariance, _) in zip(views, left, noise, strict=True):
-        W = np.linalg.inv(np.linalg.cholesky(covariance))
-        power += line_power(v.row_zero_s, basis, r @ W.T, near)
-        freedom += 2 * len(W)
+        t = v.row_zero_s
+        for of, summed in ((covariance, power), (v.covariance_px2.mean(axis=0), own)):
+            W = np.linalg.inv(np.linalg.cholesky(of))
+            summed += line_power(t, basis, r @ W.T, near)
+        freedom += 2 * r.shape[1]
+    if own.max() < LEAST_BESIDE * peak_power:
+        return 0.0
     return float((power.max() - freedom / 2) / np.sqrt(freedom / 2))
 
 
