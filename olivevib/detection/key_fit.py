@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 
 from olivevib.arrays import Bools, Floats, Grey
 from olivevib.detection.key import GEOMETRY, LIGHT, Key
-from olivevib.detection.refine import CLEAR, LEAST_GAIN, MOVED_PX, Singles
+from olivevib.detection.refine import CLEAR, LEAST_GAIN, MOVED_PX, Singles, middle
 
 UNKNOWNS = GEOMETRY + LIGHT + 1
 COARSE_PASSES, FULL_PASSES = 2, 3
 TOGETHER = 24000  # pixels of all keys of a batch: their Jacobian stays in the cache
-THINNED = 3  # of the residuals, every how many give the scale of the weights
 Shifts: TypeAlias = NDArray[np.intp]
 
 
@@ -234,9 +233,7 @@ def _light(stack: _Stack, level: Singles, T: Singles) -> Floats:
 def _tukey(residual: Singles, gain: Floats, stack: _Stack) -> Singles:
     """Weights (1 - (r / 3k)²)², k = max(.12 gain, 1.3 rms of the inner residuals)."""
     size = np.abs(residual)
-    inner = np.array(
-        [np.median(row[: int(n) : THINNED]) for row, n in zip(size, stack.count, strict=True)]
-    )
+    inner = np.array([middle(row[: int(n)]) for row, n in zip(size, stack.count, strict=True)])
     limit = 3 * np.maximum(0.12 * gain, 1.3 * 1.4826 * inner).astype(np.float32)
     u = np.minimum(size / np.maximum(limit, 1e-3)[:, None], np.float32(1))
     np.multiply(u, u, out=u)

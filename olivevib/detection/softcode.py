@@ -69,6 +69,8 @@ class SoftReader:
             wrong = (clear[:, self._bars] > 0).sum(axis=1) + (clear[:, self._white] < 0).sum(axis=1)
             one = self._nearest(area, wrong / (len(self._bars) + len(self._white)))
             best = one if best is None else _better(best, one)
+            if not best.wrong.any():
+                break  # nothing can read better
         assert best is not None
         return best
 

@@ -138,26 +138,35 @@ def _pixels(
     """Share that the card covers, and the level it adds, at the pixels of the box."""
     s = look.samples
     low, high = box
-    fine = [np.arange(low[k] * s, high[k] * s) / s + 0.5 / s - 0.5 for k in (0, 1)]
-    x, y = np.meshgrid(fine[0], fine[1])
+    x, y = ((np.arange((high[k] - low[k]) * s) + 0.5) / s - 0.5 for k in (0, 1))
     G = np.asarray(np.linalg.inv(H), dtype=np.float64)
-    w = 1 / (G[2, 0] * x + G[2, 1] * y + G[2, 2])
-    u = (G[0, 0] * x + G[0, 1] * y + G[0, 2]) * w
-    v = (G[1, 0] * x + G[1, 1] * y + G[1, 2]) * w
+    u, v = _modules_at(G, low, x, y)
     du, dv = _footprint(G, centre_of(H), s)
-    half = what.modules / 2 + what.quiet
-    on = _ramp((half - np.abs(u)) / du) * _ramp((half - np.abs(v)) / dv)
-    white = _pattern(what, (u, v), (du, dv))
-    level = look.dark + (look.white - look.dark) * white
+    half = np.float32(what.modules / 2 + what.quiet)
+    on: Image = _ramp((half - np.abs(u)) / np.float32(du))
+    on = on * _ramp((half - np.abs(v)) / np.float32(dv))
+    level = look.dark + (look.white - look.dark) * _pattern(what, (u, v), (du, dv))
     if hard.shade is not None:
-        level = level * hard.shade(x, y)
+        level *= hard.shade(*np.meshgrid(x + low[0], y + low[1])).astype(np.float32)
     if hard.mask is not None:
-        level = np.where(hard.mask(u, v), hard.level, level)
+        level = np.where(hard.mask(u.astype(np.float64), v.astype(np.float64)), hard.level, level)
     both = cv2.merge([on.astype(np.float32), (on * level).astype(np.float32)])
     both = _smeared(np.asarray(both, dtype=np.float32), look)
     small = cv2.resize(both, (int(high[0] - low[0]), int(high[1] - low[1])), None, 0, 0, 3)
     out = np.asarray(small, dtype=np.float64)
     return out[..., 0], out[..., 1]
+
+
+def _modules_at(G: Floats, low: Floats, x: Floats, y: Floats) -> tuple[Image, Image]:
+    """Module coordinates of the samples at columns x and rows y, px from ``low``.
+
+    In single precision, which about a marker's own corner is good to 1e-5 px.
+    """
+    there = G @ np.array([[1, 0, low[0]], [0, 1, low[1]], [0, 0, 1.0]])
+    across = (there[:, :1] * x).astype(np.float32)
+    down = (there[:, 1:2] * y + there[:, 2:]).astype(np.float32)
+    w = np.float32(1) / (across[2] + down[2][:, None])
+    return (across[0] + down[0][:, None]) * w, (across[1] + down[1][:, None]) * w
 
 
 def _footprint(G: Floats, at: Floats, samples: int) -> tuple[float, float]:
@@ -168,22 +177,23 @@ def _footprint(G: Floats, at: Floats, samples: int) -> tuple[float, float]:
     return float(du), float(dv)
 
 
-def _ramp(distance: Floats) -> Floats:
-    out: Floats = np.clip(distance + 0.5, 0.0, 1.0)
+def _ramp(distance: Image) -> Image:
+    out: Image = np.clip(distance + np.float32(0.5), 0, 1)
     return out
 
 
-def _pattern(what: Print, at: tuple[Floats, Floats], width: tuple[float, float]) -> Floats:
+def _pattern(what: Print, at: tuple[Image, Image], width: tuple[float, float]) -> Image:
     """White (1) or dark (0) of fine samples, each the mean over its own width."""
     pad = int(np.ceil(what.quiet)) + 1
     white = np.pad(np.where(what.dark, 0, 1), pad, constant_values=1).astype(np.float32)
     maps = []
     for axis in (0, 1):
-        place = at[axis] + (what.modules / 2 + pad)
+        place = at[axis] + np.float32(what.modules / 2 + pad)
         edge = np.rint(place)
-        maps.append((edge - 1 + _ramp((place - edge) / width[axis])).astype(np.float32))
+        place -= edge
+        maps.append(edge - 1 + _ramp(place / np.float32(width[axis])))
     read = cv2.remap(white, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(read, dtype=np.float64)
+    return np.asarray(read, dtype=np.float32)
 
 
 def _smeared(fine: Image, look: Look) -> Image:
