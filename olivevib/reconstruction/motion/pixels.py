@@ -218,16 +218,16 @@ def _beside(
     if peak_hz < SLOW_HZ:
         return 0.0
     near = f[np.abs(f - peak_hz) < NEAR_HZ]
-    power, own, freedom = np.zeros(near.size), np.zeros(near.size), 0
+    power, freedom = np.zeros((2, near.size)), 0
     for v, (r, basis), (covariance, _) in zip(views, left, noise, strict=True):
         t = v.row_zero_s
-        for of, summed in ((covariance, power), (v.covariance_px2.mean(axis=0), own)):
+        for k, of in enumerate((covariance, v.covariance_px2.mean(axis=0))):
             W = np.linalg.inv(np.linalg.cholesky(of))
-            summed += line_power(t, basis, r @ W.T, near)
+            power[k] += line_power(t, basis, r @ W.T, near)
         freedom += 2 * r.shape[1]
-    if own.max() < LEAST_BESIDE * peak_power:
+    if power[1].max() < LEAST_BESIDE * peak_power:
         return 0.0
-    return float((power.max() - freedom / 2) / np.sqrt(freedom / 2))
+    return float((power[0].max() - freedom / 2) / np.sqrt(freedom / 2))
 
 
 def _size(views: list[Sightings], noise: tuple[tuple[Floats, float], ...]) -> float:
