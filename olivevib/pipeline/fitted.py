@@ -24,6 +24,7 @@ from olivevib.vibration import (
 )
 from olivevib.vibration.analysis import scaled_line
 from olivevib.vibration.clock import between
+from olivevib.vibration.figures import LineFigures
 from olivevib.vibration.kinematics import QUANTITIES, UNITS, line_motion
 
 OPEN = (LineStatus.AMBIGUOUS, LineStatus.ALIASED)
@@ -87,14 +88,24 @@ def _row(row: MarkerMotion, fit: MotionFit, marker: FittedMarker | None) -> Mark
     figures = {}
     for n, quantity in enumerate(QUANTITIES):
         part = scaled_line(line, n)
+        own = getattr(row, quantity)
         figures[quantity] = replace(
-            getattr(row, quantity),
+            own,
+            extent_sigma=float(np.hypot(own.extent_sigma, _swing_sigma(part))),
             line_amplitude=part.amplitude,
             line_amplitude_sigma=part.sigma,
             thd_percent=part.thd_percent,
         )
     candidates = tuple(_candidate(line, f) for f in line.candidates_hz)
     return replace(row, line=line, candidates=candidates, **figures)
+
+
+def _swing_sigma(line: LineFigures) -> float:
+    """Sigma of the line's peak-to-peak along its motion; 0 where the line has none."""
+    a, s = line.amplitude, line.sigma
+    known = np.isfinite(a) & np.isfinite(s)
+    size = float(np.linalg.norm(a[known]))
+    return 2 * float(np.linalg.norm(a[known] * s[known])) / size if size > 0 else 0.0
 
 
 def _candidate(line: Line, f_hz: float) -> CandidateMotion:
