@@ -155,7 +155,7 @@ def fit_views(
         if (np.abs(step) < STOP).all():
             break
     jacobian, left, noise = _linearised(parts, motion, state)
-    excess = max(_excess(part, motion, state, line_hz) for part in parts)
+    excess = float(np.mean([_excess(part, motion, state, line_hz) for part in parts]))
     return replace(state, covariance=solve(jacobian / noise, left / noise)[1] * excess)
 
 

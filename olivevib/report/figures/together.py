@@ -136,7 +136,7 @@ def deflection(shape: Deflection, path: Trajectory, names: Mapping[int, str]) ->
 
 def _placed(shape: Deflection, path: Trajectory) -> Deflection:
     """The shape without markers that have no place in these paths."""
-    seen = dict(zip(path.ids.tolist(), path.seen.any(axis=0), strict=True))
+    seen = dict(zip(path.ids.tolist(), np.logical_or.reduce(path.seen, axis=0), strict=True))
     rows = [k for k, i in enumerate(shape.ids) if seen.get(i, False)]
     return replace(shape, ids=tuple(shape.ids[k] for k in rows), shape=shape.shape[rows])
 
