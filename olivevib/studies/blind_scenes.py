@@ -12,12 +12,8 @@ import numpy as np
 from olivevib.arrays import Floats, Ints
 from olivevib.geometry import CameraModel, StereoRig, rotation_from_vector
 from olivevib.reconstruction.motion.observe import gather
-from olivevib.reconstruction.motion.types import (
-    Anchor,
-    MarkerSightings,
-    Observations,
-    Sightings,
-)
+from olivevib.reconstruction.motion.sightings import MarkerSightings, Observations, Sightings
+from olivevib.reconstruction.motion.types import Anchor
 
 RATE_HZ = 30.0
 ROWS = 720

@@ -3,16 +3,14 @@
 from olivevib.reconstruction.motion.drawing import Pattern
 from olivevib.reconstruction.motion.fit import fit_motion
 from olivevib.reconstruction.motion.observe import observe
+from olivevib.reconstruction.motion.sightings import MarkerSightings, Observations, Sightings
 from olivevib.reconstruction.motion.types import (
     Anchor,
     BranchTable,
     MarkerMotion,
-    MarkerSightings,
     Motion,
     MotionFit,
     MotionSettings,
-    Observations,
-    Sightings,
     Timing,
 )
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from olivevib.arrays import Bools, Floats, bools
 from olivevib.geometry import apply_homography, homography
-from olivevib.reconstruction.motion.types import Drawn
+from olivevib.reconstruction.motion.sightings import Drawn
 
 NODE = np.sqrt(0.15)  # of the marker's side: three Gauss points to a side
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from olivevib.arrays import Floats
-from olivevib.reconstruction.motion.types import MotionSettings, Observations
+from olivevib.reconstruction.motion.sightings import Observations
+from olivevib.reconstruction.motion.types import MotionSettings
 
 FREE = 0.05  # frequency x exposure up to which no gain is needed (below 0.5 %)
 MOST = 0.25  # above which no amplitude is given

@@ -10,6 +10,7 @@ from scipy.linalg import solve_triangular
 from olivevib.arrays import Floats
 from olivevib.geometry import StereoRig
 from olivevib.reconstruction.motion.problem import Pose, Problem, Whitening, linearise
+from olivevib.reconstruction.motion.sightings import Observations
 from olivevib.reconstruction.motion.solve import (
     SHARED,
     Branch,
@@ -19,7 +20,7 @@ from olivevib.reconstruction.motion.solve import (
     marginal,
     reduce,
 )
-from olivevib.reconstruction.motion.types import MarkerMotion, Observations, Timing
+from olivevib.reconstruction.motion.types import MarkerMotion, Timing
 
 FIXED = 1e24  # precision of what is not fitted, in units of its own curvature
 

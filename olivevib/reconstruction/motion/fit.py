@@ -30,6 +30,7 @@ from olivevib.reconstruction.motion.prepare import (
     sway_precision,
 )
 from olivevib.reconstruction.motion.problem import Pose, Whitening
+from olivevib.reconstruction.motion.sightings import Observations
 from olivevib.reconstruction.motion.solve import Branch, Model, settle, with_frequency
 from olivevib.reconstruction.motion.start import about_sway
 from olivevib.reconstruction.motion.types import (
@@ -38,7 +39,6 @@ from olivevib.reconstruction.motion.types import (
     MarkerMotion,
     MotionFit,
     MotionSettings,
-    Observations,
 )
 from olivevib.reconstruction.motion.wander import Growth, growth_of, pace_of, weigh_paces
 

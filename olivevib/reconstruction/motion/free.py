@@ -16,15 +16,10 @@ from olivevib.reconstruction.motion.finish import (
 )
 from olivevib.reconstruction.motion.pixels import look
 from olivevib.reconstruction.motion.prepare import layout, model_of, sway_precision
+from olivevib.reconstruction.motion.sightings import Observations
 from olivevib.reconstruction.motion.solve import settle
 from olivevib.reconstruction.motion.start import about_sway
-from olivevib.reconstruction.motion.types import (
-    Anchor,
-    BranchTable,
-    MotionFit,
-    MotionSettings,
-    Observations,
-)
+from olivevib.reconstruction.motion.types import Anchor, BranchTable, MotionFit, MotionSettings
 from olivevib.vibration.types import LineStatus
 
 KNOTS_A_CYCLE = 2.4

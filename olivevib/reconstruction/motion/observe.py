@@ -9,7 +9,7 @@ import numpy as np
 
 from olivevib.arrays import Floats
 from olivevib.reconstruction.motion.drawing import Pattern, drawn, nodes
-from olivevib.reconstruction.motion.types import MarkerSightings, Observations, Sightings
+from olivevib.reconstruction.motion.sightings import MarkerSightings, Observations, Sightings
 from olivevib.signals import State
 from olivevib.tracking import Track
 

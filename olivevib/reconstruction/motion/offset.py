@@ -13,15 +13,10 @@ import numpy as np
 from olivevib.arrays import Floats
 from olivevib.geometry import StereoRig
 from olivevib.reconstruction.motion.pixels import Pixels
+from olivevib.reconstruction.motion.sightings import MarkerSightings, Observations, Sightings
 from olivevib.reconstruction.motion.spline import Knots, knots_over
 from olivevib.reconstruction.motion.start import mean_pose
-from olivevib.reconstruction.motion.types import (
-    Anchor,
-    MarkerSightings,
-    MotionSettings,
-    Observations,
-    Sightings,
-)
+from olivevib.reconstruction.motion.types import Anchor, MotionSettings
 
 WEAK_S = 5e-3  # sigma of an offset above which it is searched for
 STEP_S = 2e-3

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from olivevib.arrays import Floats
+from olivevib.reconstruction.motion.sightings import Observations, Sightings
 from olivevib.reconstruction.motion.spline import knots_over
-from olivevib.reconstruction.motion.types import Observations, Sightings
 
 SPACINGS_S = (0.4, 0.3, 0.2, 0.15, 0.1)  # of knots, longest first
 RISE = 1.05  # of the noise variance that a longer spacing may cost

@@ -6,9 +6,10 @@ import numpy as np
 
 from olivevib.arrays import Bools, Floats
 from olivevib.reconstruction.motion.problem import Problem, Times
+from olivevib.reconstruction.motion.sightings import Observations
 from olivevib.reconstruction.motion.solve import SHARED, Model
 from olivevib.reconstruction.motion.spline import Knots, knots_over
-from olivevib.reconstruction.motion.types import Anchor, MotionSettings, Observations
+from olivevib.reconstruction.motion.types import Anchor, MotionSettings
 
 ROW_TIME_GUESS_S = 4e-5  # sigma of a row time of which nothing is known
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from olivevib.arrays import Bools, Floats, Ints
 from olivevib.geometry import CameraModel, StereoRig, rotation_from_vector, skew
+from olivevib.reconstruction.motion.sightings import MarkerSightings, Sightings
 from olivevib.reconstruction.motion.spline import ORDER, Knots
-from olivevib.reconstruction.motion.types import MarkerSightings, Sightings
 
 
 @dataclass(frozen=True)

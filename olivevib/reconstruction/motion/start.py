@@ -15,8 +15,8 @@ from olivevib.reconstruction.motion.problem import (
     linearise,
     sway_part,
 )
+from olivevib.reconstruction.motion.sightings import MarkerSightings, Observations
 from olivevib.reconstruction.motion.spline import Knots
-from olivevib.reconstruction.motion.types import MarkerSightings, Observations
 from olivevib.reconstruction.pose import rotations
 
 SWAY_STEPS = 2

@@ -18,9 +18,9 @@ from olivevib.reconstruction.motion.branches import (
     prefer_double,
 )
 from olivevib.reconstruction.motion.pixels import SLOW_HZ, line_power, views_of
+from olivevib.reconstruction.motion.sightings import Observations, Sightings
 from olivevib.reconstruction.motion.solve import SHARED, Model, settle
 from olivevib.reconstruction.motion.spline import Knots, knots_over
-from olivevib.reconstruction.motion.types import Observations, Sightings
 
 WINDOW_S = 1.0
 HOP_S = 0.25
