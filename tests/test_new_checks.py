@@ -67,7 +67,7 @@ def test_several_faults_are_all_told(raw):
 
 def test_what_is_not_said_is_told_and_what_is_said_is_not(raw):
     words = " ".join(unsaid(plan(raw, markers="aruco:DICT_4X4_1000")))
-    for part in ("marker size", "board recordings", "marker ids", "exposure", "band", "row time"):
+    for part in ("marker size", "board", "marker ids", "exposure", "band", "row time"):
         assert part in words
     said = {"size_mm": 60.0, "exposure_ms": 2.0, "band_hz": (5.0, 14.0), "shutter": "global"}
     assert unsaid(board(raw, **said)) == ()

@@ -121,7 +121,8 @@ def _terminal() -> list[Check]:
     size = shutil.get_terminal_size()
     fits = size.columns >= 80 and size.lines >= 24
     words = f"{size.columns} x {size.lines}" + ("" if fits else "; the app needs 80 x 24")
-    encoding = (sys.stdout.encoding or "").lower()
+    stream = sys.__stdout__ or sys.stdout  # the app puts something of its own in the latter's place
+    encoding = (stream.encoding or "").lower()
     unicode_words = encoding or "unknown"
     out = [Check("terminal", "size", "ok" if fits else "note", words)]
     plain = "utf" not in encoding

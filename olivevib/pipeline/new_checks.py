@@ -64,7 +64,9 @@ def unsaid(plan: NewTrial) -> tuple[str, ...]:
     if plan.size_mm is None and not plan.sizes_mm:
         out.append("marker size (--size MM): reconstruct needs it")
     if not (plan.rig or plan.calibration_left):
-        out.append("board recordings or a rig (--rig FILE): without them there is no 3-D")
+        out.append(
+            "board (--calibration-left, -right and --board, or --rig): without it there is no 3-D"
+        )
     if not plan.ids and not _small(plan.markers):
         out.append("marker ids (--ids 1-8): every id of this large library counts as a marker")
     if plan.exposure_ms is None:

@@ -83,13 +83,13 @@ def table_words(setup: Setup, found: Sequence[Outlook]) -> str:
         f"{found[0].amplitude_mm:g} mm peak; markers {setup.marker_px:.1f} px high; zones to "
         f"avoid: {_zone_words(setup)}",
         "",
-        "    Hz  seen at  status       least mm  sigma mm  depth mm  false depth mm   m/s²",
+        "    Hz seen at  status      least mm sigma mm depth mm false depth   m/s²",
     ]
     for o in found:
         least = "-" if math.isinf(o.least_amplitude_mm) else f"{o.least_amplitude_mm:.2f}"
         false = "-" if math.isnan(o.false_depth_mm) else f"{o.false_depth_mm:.2f}"
         lines.append(
-            f"{o.f_hz:6.2f} {o.seen_hz:8.2f}  {o.status:12} {least:>8} {o.sigma_plane_mm:9.3f} "
-            f"{o.sigma_depth_mm:9.3f} {false:>15} {o.acceleration_m_s2:6.1f}"
+            f"{o.f_hz:6.2f} {o.seen_hz:7.2f}  {o.status:11} {least:>8} {o.sigma_plane_mm:8.3f} "
+            f"{o.sigma_depth_mm:8.3f} {false:>11} {o.acceleration_m_s2:6.1f}"
         )
     return "\n".join(lines)

@@ -65,6 +65,8 @@ class BatchPage(Page):
         table.add_columns("", "trial", "now", "result", "hash of the results")
         table.focus()
         self._subtitle()
+        self._lines = {f: BatchLine(f.name, "…", True) for f in self.olive.trials}
+        self._fill()
 
     def read(self) -> tuple[TrialRow, ...]:
         """Each trial with its quality word; archived ones are left out."""

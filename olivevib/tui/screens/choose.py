@@ -14,11 +14,12 @@ from textual.widgets import Button, Input, OptionList
 from textual.widgets.option_list import Option
 
 from olivevib.tui.harmless import harmless, plain
+from olivevib.tui.screens.early import EarlyKeys
 
 ROWS = ("1234567890", "qwertyuiop", "asdfghjkl_", "zxcvbnm-.,", ":=/ ")
 
 
-class ChooseScreen(ModalScreen[str | None]):
+class ChooseScreen(EarlyKeys, ModalScreen[str | None]):
     """Gives the text that was chosen, or None."""
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "dismiss", "Leave it")]

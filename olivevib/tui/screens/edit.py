@@ -12,9 +12,10 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
 from olivevib.tui.harmless import harmless
+from olivevib.tui.screens.early import EarlyKeys
 
 
-class EditScreen(ModalScreen[str | None]):
+class EditScreen(EarlyKeys, ModalScreen[str | None]):
     """Gives the text that was typed, or None."""
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "dismiss", "Leave it", show=False)]

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
+from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.widgets import DataTable
+from textual.widgets import DataTable, Static
 
-from olivevib.tui.harmless import plain
+from olivevib.tui.harmless import harmless, plain
 from olivevib.tui.loader import machine_checks
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.views.tables import meaning
+
+if TYPE_CHECKING:
+    from olivevib.pipeline.machine import Check
 
 STYLES = {"ok": "good", "note": "warn", "missing": "bad"}
 
@@ -30,9 +34,12 @@ class MachinePage(Page):
     JUMPS = (Jump("c", "#checks"),)
     BINDINGS: ClassVar[list[BindingType]] = [Binding("f5", "reload", "Look again")]
 
+    _checks: tuple[Check, ...] = ()
+
     def body(self) -> ComposeResult:
         """One table."""
         yield DataTable(id="checks", classes="pane", cursor_type="row")
+        yield Static(id="why", markup=False)
 
     def on_mount(self) -> None:
         """Start in the table."""
@@ -65,9 +72,15 @@ class MachinePage(Page):
         told = f"{missing} missing" if missing else "everything that is needed is here"
         table.border_subtitle = told
 
+    @on(DataTable.RowHighlighted, "#checks")
+    def _explain(self) -> None:
+        at, checks = self.query_one("#checks", DataTable).cursor_row, self._checks
+        if 0 <= at < len(checks):
+            self.query_one("#why", Static).update(harmless(checks[at].words, 400))
+
     def recolour(self) -> None:
         """Draw again in the new theme."""
-        self.show(getattr(self, "_checks", None))
+        self.show(self._checks)
 
     def action_reload(self) -> None:
         """Look again."""

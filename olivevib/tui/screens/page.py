@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, cast
 
-from textual import events, work
+from textual import work
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.message import Message
@@ -18,6 +18,7 @@ from textual.worker import get_current_worker
 
 from olivevib.errors import OlivevibError
 from olivevib.tui.loader import change_trial, guarded
+from olivevib.tui.screens.early import EarlyKeys
 from olivevib.tui.widgets.title import Title
 from olivevib.tui.widgets.work_line import WorkLine
 
@@ -49,7 +50,7 @@ class Command(NamedTuple):
     run: Callable[[], object]
 
 
-class Page(Screen[None]):
+class Page(EarlyKeys, Screen[None]):
     """A screen of one trial (or of all): subclasses say what to read and how to show it."""
 
     NAME: ClassVar[str] = ""
@@ -71,7 +72,6 @@ class Page(Screen[None]):
     def __init__(self, folder: Path) -> None:
         super().__init__()
         self.folder = folder
-        self._early: list[events.Key] | None = []  # typed while the page opens; None: it is open
 
     @property
     def olive(self) -> OlivevibApp:
@@ -94,21 +94,8 @@ class Page(Screen[None]):
 
         Textual calls the handlers of base classes by itself: subclasses do not call this one.
         """
-        self.call_after_refresh(self._opened)
         self.watch(self.app, "revision", self.reload)
         self.watch(self.app, "theme", self.recolour, init=False)
-
-    def on_key(self, event: events.Key) -> None:
-        """Keep what is typed before the page has a focus: a fast hand loses no key."""
-        if self._early is not None and self.focused is None:
-            event.stop()
-            event.prevent_default()
-            self._early.append(event)
-
-    def _opened(self) -> None:
-        early, self._early = self._early or [], None
-        for event in early:
-            self.app.post_message(events.Key(event.key, event.character))
 
     def reload(self) -> None:
         """Read again, in a thread; what comes is handed to ``show``."""

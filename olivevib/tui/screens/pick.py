@@ -15,6 +15,7 @@ from textual.widgets import Button, Footer, Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from olivevib.tui.harmless import harmless
+from olivevib.tui.screens.early import EarlyKeys
 from olivevib.tui.views.folder import Entry, entries_of, entry_text, pictures_in
 
 
@@ -29,7 +30,7 @@ class Typed(Input):
             self.screen.action_up()
 
 
-class PickScreen(ModalScreen[Path | None]):
+class PickScreen(EarlyKeys, ModalScreen[Path | None]):
     """Gives the path that was chosen, or None."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -46,6 +47,7 @@ class PickScreen(ModalScreen[Path | None]):
         super().__init__()
         self._heading, self._here = title, start.resolve()
         self._entries: tuple[Entry, ...] = ()
+        self._words = ""  # what the list is narrowed by
 
     def compose(self) -> ComposeResult:
         """Where one is, a line to type in, what is there, two buttons for the mouse."""
@@ -66,20 +68,25 @@ class PickScreen(ModalScreen[Path | None]):
         for button in self.query(Button):
             button.can_focus = False
         self._show(self._here)
+        self._fill(self.query_one("#typed", Input).value)
         self.query_one("#typed").focus()
 
-    def _show(self, folder: Path) -> None:
+    def _enter(self, folder: Path) -> None:
         """Another folder, nothing typed."""
+        self.query_one("#typed", Input).value = ""
+        self._show(folder)
+        self._fill("")
+
+    def _show(self, folder: Path) -> None:
+        """Say which folder it is."""
         self._here = folder.resolve()
         self.query_one("#here", Static).update(harmless(self._here, 200))
         take = self.query_one("#take", Button)
         pictures = pictures_in(self._here)
         take.label = f"take this folder ({pictures} pictures)" if pictures else "take this folder"
-        self.query_one("#typed", Input).value = ""
-        self._fill()
 
-    def _fill(self) -> None:
-        words = self.query_one("#typed", Input).value
+    def _fill(self, words: str) -> None:
+        self._words = words
         try:
             self._entries = entries_of(self._here, "" if _is_path(words) else words)
             fault = Text("nothing here by that name" if words else "an empty folder")
@@ -94,12 +101,15 @@ class PickScreen(ModalScreen[Path | None]):
             listed.add_option(Option(fault, disabled=True))
 
     @on(Input.Changed, "#typed")
-    def _narrow(self) -> None:
-        self._fill()
+    def _narrow(self, event: Input.Changed) -> None:
+        if event.value == self.query_one("#typed", Input).value != self._words:
+            self._fill(event.value)
 
     @on(Input.Submitted, "#typed")
     def _entered(self, event: Input.Submitted) -> None:
-        """A path that was typed, else what is marked."""
+        """A path that was typed, else what is marked; a fast hand is ahead of the list."""
+        if event.value != self._words:
+            self._fill(event.value)
         path = Path(event.value).expanduser()
         if _is_path(event.value) and not path.exists():
             self.query_one("#here", Static).update(f"{harmless(path, 150)} is not there.")
@@ -118,7 +128,7 @@ class PickScreen(ModalScreen[Path | None]):
     def _take(self, path: Path) -> None:
         """Open a folder, give a file."""
         if path.is_dir():
-            self._show(path)
+            self._enter(path)
         else:
             self.dismiss(path)
 
@@ -146,7 +156,7 @@ class PickScreen(ModalScreen[Path | None]):
 
     def action_up(self) -> None:
         """Show the folder above."""
-        self._show(self._here.parent)
+        self._enter(self._here.parent)
 
 
 def _is_path(words: str) -> bool:
