@@ -15,14 +15,17 @@ from olivevib.trial import Trial
 from olivevib.trial.summary import summary
 
 
-def write_sensor(path: Path, header: str = "Time (s),X (m/s2),Y (m/s2),Z (m/s2)") -> Path:
+def write_sensor(
+    path: Path, header: str = "Time (s),X (m/s2),Y (m/s2),Z (m/s2)", times: bool = True
+) -> Path:
     """What a logger on marker 3 writes: its orbit, from 1 s before to 1 s after the film."""
     t = np.arange(-1.0, 3.0, 1e-3)
     turn = 2 * np.pi * small_trial.F_HZ * t + 3
     a = -1e-3 * (2 * np.pi * small_trial.F_HZ) ** 2
     xyz = a * np.stack([4 * np.cos(turn), 2 * np.sin(turn), 1.5 * np.cos(turn)], axis=1)
     rows = [
-        f"{s + 1:.4f},{x:.5f},{y:.5f},{z + 9.81:.5f}" for s, (x, y, z) in zip(t, xyz, strict=True)
+        f"{s + 1:.4f}," * times + f"{x:.5f},{y:.5f},{z + 9.81:.5f}"
+        for s, (x, y, z) in zip(t, xyz, strict=True)
     ]
     path.write_text("\n".join([header, *rows]), encoding="utf-8")
     return path
@@ -129,7 +132,8 @@ def test_two_sensors_each_with_axes_lever_and_preset(done, tmp_path):
     ]  # fmt: skip
     pipeline.compare(done.changed({"accelerometers": sensors}))
     first, second = done.reopen().comparison
-    assert [c.verdict for c in (first, second)] == ["agrees", "agrees"]
+    assert [c.verdict for c in (first, second)] == ["undecided", "undecided"]
+    assert first.reason.startswith("Amplitudes only: camera and accelerometer agree")
     assert first.ambiguous  # a steady motion: the lag repeats, half a period is half a turn
     assert np.isfinite([first.rival_offset_s, first.rival_turn_deg]).all()
     assert abs(first.gain - 1) < 0.01
@@ -140,6 +144,48 @@ def test_two_sensors_each_with_axes_lever_and_preset(done, tmp_path):
     assert 0 < told[0]["limits_mm"]["x"] < 0.5
     assert told[0]["limits_sigma_mm"]["x"] < told[0]["limits_mm"]["x"]
     done.changed({"accelerometers": sensors[:1]})
+
+
+def test_new_takes_several_sensors_and_show_tells_them_all(videos, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    one, two = (write_sensor(tmp_path / f"{k}.csv", "time (s),x (m/s2),y (m/s2),z (m/s2)")
+                for k in "ab")  # fmt: skip
+    small_trial.make(tmp_path / "like", videos)
+    recordings = ("--left", videos["left"], "--right", videos["right"],
+                  "--rig", tmp_path / "like_rig.toml")  # fmt: skip
+    markers = ("--markers", "aruco:DICT_4X4_50", "--size", "70", "--ids", "3,11")
+    sensors = ("--accelerometer", one, "--accelerometer", two, "--accelerometer-marker", "11",
+               "--accelerometer-marker", "3", "--accelerometer-axes", "-",
+               "--accelerometer-axes=x,-z,y", "--accelerometer-lever", "-",
+               "--accelerometer-lever=0,25,-8")  # fmt: skip
+    verb = [str(word) for word in ("new", "several", *recordings, *markers, *sensors)]
+    assert main(verb) == 0
+    first, second = Trial.open(tmp_path / "several").settings.accelerometers
+    assert (first.file, first.marker, first.axes) == ("accelerometer.csv", 11, ())
+    assert (second.file, second.marker) == ("accelerometer_2.csv", 3)
+    assert second.axes == ("x", "-z", "y")
+    assert second.lever_mm == (0.0, 25.0, -8.0)
+    assert main(["run", "-q", "several"]) in (0, 3)
+    capsys.readouterr()
+    assert main(["show", "several"]) in (0, 3)
+    told = capsys.readouterr().out
+    assert "accelerometer accelerometer.csv at marker 11" in told
+    assert "accelerometer accelerometer_2.csv at marker 3" in told
+    assert main([*verb[:1], "more", *verb[2:], "--accelerometer-marker", "3"]) == 2
+    assert "3 times for 2 sensors" in capsys.readouterr().err
+
+
+def test_an_error_of_a_sensor_says_where_its_option_goes(videos, tmp_path):
+    bare = write_sensor(tmp_path / "bare.csv", "ax (m/s2),ay (m/s2),az (m/s2)", times=False)
+    trial = small_trial.make(
+        tmp_path / "bare", videos, accelerometer=str(bare), accelerometer_marker=3
+    )
+    from olivevib.pipeline.compare import sensor_record
+
+    with pytest.raises(InputError, match="rate_hz = 1000") as told:
+        sensor_record(trial, trial.settings.accelerometers[0])
+    assert "[[accelerometers]]" in told.value.remedy
+    assert str(trial.folder / "trial.toml") in told.value.remedy
 
 
 def test_a_preset_is_kept_and_used_by_new(done, videos, tmp_path, monkeypatch, capsys):

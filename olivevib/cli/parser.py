@@ -92,8 +92,7 @@ def _prepare_verbs(verbs: Any) -> None:
     new.add_argument("--band", metavar="5-45", help="where the shaker's frequency may lie, Hz")
     new.add_argument("--left-stamps", metavar="FILE", help="time stamps, one a frame")
     new.add_argument("--right-stamps", metavar="FILE", help="time stamps, one a frame")
-    new.add_argument("--accelerometer", metavar="FILE", help="what the logger wrote")
-    new.add_argument("--accelerometer-marker", type=int, metavar="ID", help="where it was fixed")
+    _sensor_options(new)
     new.add_argument("--preset", metavar="NAME", help="how it is read (olivevib preset)")
     new.add_argument("--link", action="store_true", help="leave the recordings where they are")
     _set_option(new)
@@ -106,6 +105,18 @@ def _prepare_verbs(verbs: Any) -> None:
     preset.add_argument("trial", metavar="TRIAL", help="its [[accelerometers]] say how")
     preset.add_argument("name", metavar="NAME", help="becomes presets/NAME.toml")
     preset.add_argument("--sensor", type=int, default=1, metavar="N", help="which one (1)")
+
+
+def _sensor_options(new: argparse.ArgumentParser) -> None:
+    """Each option again for each sensor, in the same order; - where one is not said."""
+    for name, value, help_ in (
+        ("", "FILE", "what the logger wrote; again for each sensor"),
+        ("-marker", "ID", "where it was fixed; in the sensors' order, - for none"),
+        ("-axes", "x,y,z", "which of its axes are x, y, z, such as x,-z,y"),
+        ("-lever", "X,Y,Z", "where it sat: mm from the marker's centre, right, down, inwards"),
+    ):
+        option = f"--accelerometer{name}"
+        new.add_argument(option, action="append", default=[], metavar=value, help=help_)
 
 
 def _capture_verb(verbs: Any) -> None:

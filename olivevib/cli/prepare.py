@@ -44,8 +44,12 @@ def new(arguments: argparse.Namespace, console: Console) -> int:
         band_hz=values.band(arguments.band),
         left_stamps=arguments.left_stamps,
         right_stamps=arguments.right_stamps,
-        accelerometer=arguments.accelerometer,
-        accelerometer_marker=arguments.accelerometer_marker,
+        sensors=pipeline.sensor_plans(
+            arguments.accelerometer,
+            arguments.accelerometer_marker,
+            arguments.accelerometer_axes,
+            arguments.accelerometer_lever,
+        ),
         preset=find_preset(arguments.preset, Path()) if arguments.preset else None,
         link=arguments.link,
     )

@@ -18,7 +18,7 @@ def summary_text(facts: dict[str, Any]) -> str:
         _calibration(facts["calibration"]),
         _timing(facts["timing"]),
         _markers(facts["markers"]),
-        _comparison(facts["comparison"]),
+        *(_comparison(c) for c in facts["comparisons"] or [facts["comparison"]]),
         [f"warning [{w['code']}]: {w['text']}\n    {w['remedy']}" for w in facts["warnings"]],
     ]
     return "\n\n".join("\n".join(block) for block in blocks if block)
@@ -129,7 +129,8 @@ def frequency(m: dict[str, Any]) -> str:
 def _comparison(c: dict[str, Any]) -> list[str]:
     if c["verdict"] is None:
         return []
-    lines = [f"accelerometer: {c['verdict']}", f"  {c['reason']}"]
+    which = f" {c['sensor']} at marker {c['marker']}" if "sensor" in c else ""
+    lines = [f"accelerometer{which}: {c['verdict']}", f"  {c['reason']}"]
     if c["clock_offset_s"] is not None:
         sigma_ms = _ms(c["clock_offset_sigma_s"])
         lines.append(

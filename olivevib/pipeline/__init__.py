@@ -8,6 +8,7 @@ from olivevib.pipeline.new import NewTrial, new_trial
 from olivevib.pipeline.new_checks import Fault, faults, unsaid
 from olivevib.pipeline.outputs import export, export_place, report
 from olivevib.pipeline.run import Outcome, run, run_stage
+from olivevib.pipeline.sensor_plan import SensorPlan, sensor_plans
 from olivevib.pipeline.track import track
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "Finding",
     "NewTrial",
     "Outcome",
+    "SensorPlan",
     "analyse",
     "calibrate",
     "check",
@@ -28,6 +30,7 @@ __all__ = [
     "report",
     "run",
     "run_stage",
+    "sensor_plans",
     "track",
     "unsaid",
 ]

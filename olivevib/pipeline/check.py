@@ -139,12 +139,11 @@ def _ended(path: Path) -> bool:
 
 
 def _sensors(trial: Trial) -> Iterator[Finding]:
-    from olivevib.files.accelerometer import read_accelerometer
-    from olivevib.pipeline.compare import sensor_options
+    from olivevib.pipeline.compare import sensor_record
 
     for sensor in trial.settings.accelerometers:
         try:
-            record = read_accelerometer(trial.path(sensor.file), sensor_options(trial, sensor))
+            record = sensor_record(trial, sensor)
         except OlivevibError as error:
             yield Finding("lost", sensor.file, f"{error}")
         else:

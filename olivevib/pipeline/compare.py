@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 
 from olivevib.comparison import Comparison, ComparisonSettings, View
 from olivevib.comparison import compare as compare_records
-from olivevib.errors import Caution, InputError, UsageError
+from olivevib.errors import Caution, InputError, OlivevibError, UsageError
 from olivevib.files.accelerometer import (
     AccelerometerRecord,
     ImportOptions,
@@ -19,6 +20,7 @@ from olivevib.files.accelerometer import (
     write_preset,
 )
 from olivevib.files.store import write_stage
+from olivevib.files.trial_folders import FILE
 from olivevib.pipeline.marker_views import marker_views
 from olivevib.pipeline.motions import body_point, marker_motion
 from olivevib.progress import Tick, silent
@@ -42,11 +44,43 @@ def compare(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     cautions = list(found)
     bound = [a for a in trial.settings.accelerometers if a.marker is not None]
     for sensor in bound:
-        record = read_accelerometer(trial.path(sensor.file), sensor_options(trial, sensor))
+        record = sensor_record(trial, sensor)
         cautions.extend(record.cautions)
         results.append(compare_sensor(trial, trajectory, motion, (sensor, record), tick))
     write_stage(trial.folder / "comparison.h5", comparison_file(results, cautions, now))
     return tuple(cautions)
+
+
+def sensor_record(trial: Trial, sensor: Accelerometer) -> AccelerometerRecord:
+    """What a sensor's file holds; an error says where the options that it asks for are written."""
+    try:
+        return read_accelerometer(trial.path(sensor.file), sensor_options(trial, sensor))
+    except OlivevibError as error:
+        asked = [f.name for f in fields(ImportOptions) if re.search(rf"\b{f.name}\b", error.remedy)]
+        if not asked:
+            raise
+        place = f"{trial.folder / FILE}, under [[accelerometers]] file = {sensor.file!r}"
+        raise type(error)(
+            error.what,
+            error.why,
+            f"{error.remedy} It goes into {place}, such as: {_such(asked[0])}",
+        ) from error
+
+
+def _such(option: str) -> str:
+    """A line of trial.toml as an example."""
+    return _EXAMPLES.get(option, f"{option} = …")
+
+
+_EXAMPLES = {
+    "rate_hz": "rate_hz = 1000",
+    "unit": 'unit = "g"',
+    "per_g": "per_g = 16384",
+    "time_unit": 'time_unit = "ms"',
+    "time_column": 'time_column = "t"',
+    "columns": 'columns = ["ax", "ay", "az"]',
+    "start": 'start = "2026-11-20T10:15:00"',
+}
 
 
 def sensor_options(trial: Trial, sensor: Accelerometer) -> ImportOptions:

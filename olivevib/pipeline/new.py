@@ -18,6 +18,7 @@ from olivevib.files.stills import IMAGE_SUFFIXES
 from olivevib.files.trial_folders import FILE
 from olivevib.pipeline.new_checks import check_plan
 from olivevib.pipeline.recordings import SIDES
+from olivevib.pipeline.sensor_plan import SensorPlan
 from olivevib.progress import Tick, silent
 from olivevib.trial import Trial
 
@@ -27,6 +28,7 @@ class NewTrial:
     """What ``olivevib new`` was told; paths as the user gave them.
 
     places, sizes_mm: where single markers sit and their own size, where somebody knows it already.
+    accelerometer, accelerometer_marker: one sensor; sensors: as many as there are, told in full.
     """
 
     left: str
@@ -51,6 +53,14 @@ class NewTrial:
     exposure_ms: float | None = None
     places: Mapping[int, str] = field(default_factory=dict)
     sizes_mm: Mapping[int, float] = field(default_factory=dict)
+    sensors: tuple[SensorPlan, ...] = ()
+
+    @property
+    def every_sensor(self) -> tuple[SensorPlan, ...]:
+        """All sensors, in order."""
+        one = self.accelerometer
+        first = (SensorPlan(one, self.accelerometer_marker),) if one else ()
+        return first + self.sensors
 
 
 def new_trial(folder: Path, plan: NewTrial, tick: Tick = silent) -> Trial:
@@ -135,8 +145,9 @@ def _wanted(plan: NewTrial) -> dict[str, str]:
     for source in (plan.left_stamps, plan.right_stamps):
         if source:
             wanted.setdefault(source, Path(source).name)
-    if plan.accelerometer:
-        wanted.setdefault(plan.accelerometer, "accelerometer" + Path(plan.accelerometer).suffix)
+    for number, sensor in enumerate(plan.every_sensor, start=1):
+        name = "accelerometer" if number == 1 else f"accelerometer_{number}"
+        wanted.setdefault(sensor.file, name + Path(sensor.file).suffix)
     if plan.preset:
         wanted.setdefault(plan.preset, "accelerometer.preset.toml")
     if plan.rig:
@@ -175,14 +186,17 @@ def _document(plan: NewTrial, places: _Places) -> tomlkit.TOMLDocument:
     calibration = _calibration(plan, places)
     if calibration:
         doc["calibration"] = calibration
-    if plan.accelerometer:
-        sensor = {
-            "file": places.get(plan.accelerometer),
-            "marker": plan.accelerometer_marker,
-            "preset": places.get(plan.preset),
-        }
+    if plan.every_sensor:
         doc["accelerometers"] = tomlkit.aot()
-        doc["accelerometers"].append(_table(sensor))
+    for sensor in plan.every_sensor:
+        told = {
+            "file": places.get(sensor.file),
+            "marker": sensor.marker,
+            "preset": places.get(plan.preset),
+            "axes": list(sensor.axes) or None,
+            "lever_mm": None if sensor.lever_mm is None else list(sensor.lever_mm),
+        }
+        doc["accelerometers"].append(_table(told))
     if plan.band_hz:
         doc["vibration"] = _table({"band_hz": list(plan.band_hz)})
     doc["outcome"] = _table({})

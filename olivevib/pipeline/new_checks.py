@@ -128,10 +128,12 @@ def _said(plan: NewTrial) -> Iterator[Fault]:
 
 
 def _sensor_marker(plan: NewTrial, library: MarkerLibrary) -> Iterator[Fault]:
-    marker, ids = plan.accelerometer_marker, plan.ids or tuple(int(i) for i in library.ids)
-    if marker is not None and marker not in ids:
+    ids = plan.ids or tuple(int(i) for i in library.ids)
+    for sensor in plan.every_sensor:
+        if sensor.marker is None or sensor.marker in ids:
+            continue
         error = UsageError(
-            f"the accelerometer's marker {marker} is none of the trial's markers.",
+            f"the accelerometer's marker {sensor.marker} is none of the trial's markers.",
             "The two can only be compared where the camera sees the sensor's marker.",
             "Correct --accelerometer-marker ID, or add it to --ids.",
         )
@@ -139,9 +141,9 @@ def _sensor_marker(plan: NewTrial, library: MarkerLibrary) -> Iterator[Fault]:
 
 
 def _missing(plan: NewTrial) -> Iterator[Fault]:
-    fields = ("left", "right", "calibration_left", "calibration_right", "rig", "accelerometer")
-    for field in (*fields, "preset"):
-        name = getattr(plan, field)
+    fields = ("left", "right", "calibration_left", "calibration_right", "rig", "preset")
+    named = [(field, getattr(plan, field)) for field in fields]
+    for field, name in [*named, *(("accelerometer", s.file) for s in plan.every_sensor)]:
         if name and not Path(name).exists():
             yield Fault(field, InputError(f"{name} is missing.", "", "Check the name and folder."))
 
@@ -167,8 +169,9 @@ def _files(plan: NewTrial, gone: set[str]) -> Iterator[Fault]:
             yield from _tried(f"{side}_stamps", partial(pick_camera, stamps, named))
     if plan.rig and "rig" not in gone:
         yield from _tried("rig", lambda: _rig_size(str(plan.rig), sizes))
-    if plan.accelerometer and not gone & {"accelerometer", "preset"}:
-        yield from _tried("accelerometer", lambda: _sensor(plan))
+    if not gone & {"accelerometer", "preset"}:
+        for sensor in plan.every_sensor:
+            yield from _tried("accelerometer", partial(_sensor, sensor.file, plan.preset))
 
 
 def _tried(field: str, look: Callable[[], object]) -> Iterator[Fault]:
@@ -209,11 +212,11 @@ def _rig_size(file: str, sizes: dict[str, Size]) -> None:
             )
 
 
-def _sensor(plan: NewTrial) -> None:
+def _sensor(file: str, preset: str | None) -> None:
     """InputError where the file holds no acceleration; what options may mend waits for compare."""
-    options = read_preset(Path(plan.preset)) if plan.preset else None
+    options = read_preset(Path(preset)) if preset else None
     try:
-        read_accelerometer(Path(str(plan.accelerometer)), options)
+        read_accelerometer(Path(file), options)
     except NoAccelerationError:
         raise
     except OlivevibError:

@@ -9,9 +9,8 @@ import numpy as np
 from olivevib.arrays import Floats
 from olivevib.calibration.trust import Trust, both_seen, judge_rig, sides_mm
 from olivevib.errors import InputError, UsageError
-from olivevib.files.accelerometer import read_accelerometer
 from olivevib.geometry import StereoRig
-from olivevib.pipeline.compare import compare_sensor, sensor_options
+from olivevib.pipeline.compare import compare_sensor, sensor_record
 from olivevib.pipeline.motions import marker_motion
 from olivevib.progress import Tick, silent
 from olivevib.reconstruction import Reconstruction
@@ -96,7 +95,7 @@ def _rest(trial: Trial, result: Reconstruction, tick: Tick) -> World:
     """The vertical from the first accelerometer that was at rest and whose axes are known."""
     why = "No accelerometer is bound to a marker."
     for sensor in (a for a in trial.settings.accelerometers if a.marker is not None):
-        record = read_accelerometer(trial.path(sensor.file), sensor_options(trial, sensor))
+        record = sensor_record(trial, sensor)
         if not record.rest_found or len(record.gravity_m_s2) != 3:
             why = f"{sensor.file} was never at rest on three axes."
             continue
