@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,6 +18,11 @@ from olivevib.signals import fit_stamps
 from olivevib.tracking import Track
 from olivevib.trial.records.calibration import CalibrationRecord
 from olivevib.vibration import Line, Phase, Spectrum, Survey, Vibration
+
+_ROWS = (  # what of a trajectory has one row an instant
+    *("t_s", "sample_t_s", "xyz_mm", "sigma_xyz_mm", "covariance_mm2"),
+    *("rotation_rad", "sigma_rotation_rad", "state", "epipolar_px"),
+)
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,20 @@ class ReportContent:
     def continuous(self) -> bool:
         """Whether the paths are those of a fitted motion, finer than the frames."""
         return self.trajectory is not None and self.trajectory.method == "continuous"
+
+    @cached_property
+    def shown_path(self) -> Trajectory | None:
+        """The paths as they are drawn: of a fitted motion only where the fit holds.
+
+        Before and after, frames of cameras out of step show false depth.
+        """
+        path, steady = self.trajectory, [p for p in self.phases if p.name == "steady"]
+        if path is None or not self.continuous or not steady:
+            return path
+        kept = (path.t_s >= steady[0].start_s) & (path.t_s <= steady[-1].end_s)
+        rows = {name: getattr(path, name)[kept] for name in _ROWS}
+        rig = None if path.sigma_rig_mm is None else path.sigma_rig_mm[kept]
+        return replace(path, **rows, sigma_rig_mm=rig) if kept.sum() > 1 else path
 
     @property
     def frames(self) -> int:

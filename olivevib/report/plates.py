@@ -61,14 +61,15 @@ def seen_ids(content: ReportContent) -> list[int]:
 
 
 def _space(content: ReportContent) -> Iterator[Job]:
-    path, names, ids = content.trajectory, content.names(), seen_ids(content)
+    path, names, ids = content.shown_path, content.names(), seen_ids(content)
     rig, lines = content.rig, content.lines()
     if rig is not None:
         yield ("paths", _SCENE, lambda: figures.scene(rig, path, names))
     if path is None or not ids:
         return
     for group in _groups(ids, ROWS):
-        yield ("motion", _once(_MOTION, group, ids), _bound(
+        caption = _MOTION + (_FITTED if content.continuous else "")
+        yield ("motion", _once(caption, group, ids), _bound(
             figures.time_series, path, names, group, figures.whole(path), content.phases
         ))  # fmt: skip
     window, closest = _close(content, ids)
@@ -102,7 +103,7 @@ def _bound(function: Callable[..., str], *values: object) -> Callable[[], str]:
 
 def _close(content: ReportContent, ids: Sequence[int]) -> tuple[figures.Window | None, list[int]]:
     """A second (or 15 frames) of the steady phase, and the three markers that move most."""
-    path = content.trajectory
+    path = content.shown_path
     assert path is not None
     steady = [(span.start_s, span.end_s) for span in content.phases if span.name == "steady"]
     whole = figures.whole(path)
@@ -126,7 +127,7 @@ def ranked(content: ReportContent, ids: Sequence[int]) -> list[int]:
 
 def _changing(content: ReportContent, most: Sequence[int]) -> Iterator[Job]:
     """The spectrograms of the markers that move most."""
-    path, half, names = content.trajectory, content.half_rate_hz, content.names()
+    path, half, names = content.shown_path, content.half_rate_hz, content.names()
     assert path is not None
     each = {i: figures.spectrogram(path, i, half) for i in sorted(most[:SPECTROGRAMS])}
     found = {i: one for i, one in each.items() if one is not None and np.isfinite(one.power).any()}
@@ -223,6 +224,10 @@ _MOTION = (
     " row; a gap is a gap, with a"
     " bar at the bottom where the marker was not located; circles are doubtful samples; grey:"
     " start-up, shut-down and decay."
+)
+_FITTED = (
+    " Drawn only where the fitted motion holds: before and after it, frames of cameras out of step"
+    " would show false depth."
 )
 _CLOSE = (
     "{length} s of the markers that move most: dots are {each}, the thin grey curve is the"

@@ -26,7 +26,7 @@ def response_jobs(content: ReportContent) -> Iterator[Job]:
 
 def body_jobs(content: ReportContent, largest_first: Sequence[int]) -> Iterator[Job]:
     """The deflection shape, and the rotation of the markers that move most."""
-    path, survey, names = content.trajectory, content.survey, content.names()
+    path, survey, names = content.shown_path, content.survey, content.names()
     if path is None or survey is None:
         return
     shape = survey.deflection
