@@ -28,6 +28,7 @@ _RESEMBLES = 0.8  # correlation below which the two motions are not called the s
 _OPEN_DEG = 8.0  # sigma of the turn from which what is seen across may be noise
 _OPEN_RAD = 1.0  # sigma of a turn that nothing fixes
 _LEAST_LEFT = 0.005  # of the motion's power that taking out the slow part must leave
+_QUARTER = 0.25 / np.sqrt(3)  # of a period: sigma of a lag that may be off by a quarter
 _NO_COLUMNS = Nuisance(np.empty((0, 0)), 0.0)
 
 
@@ -274,6 +275,8 @@ def _comparison(
 ) -> Comparison:
     sigma = clock.sigma
     offset_sigma = float(np.hypot(sigma[0], 0.0 if rival.excluded else rival.scatter_s))
+    if work.missing_axes:
+        offset_sigma = float(np.hypot(offset_sigma, _QUARTER / work.line_hz))
     straight = _is_straight(seen.mm, clock)
     worst_deg = float(np.degrees(_OPEN_RAD if straight else clock.turn_sigma_rad))
     angle = angle_deg(clock.R_camera_sensor)
@@ -328,7 +331,8 @@ def _verdict(work: _Work, lag: CoarseLag, clock: ClockFit, coherence: float) -> 
         return Verdict.UNDECIDED, (
             f"The accelerometer has {3 - work.missing_axes} of three axes: the clocks are "
             f"compared (correlation {r:.2f}), but a gain of {clock.gain:.3f} may be the angle "
-            "between its axes and the motion."
+            "between its axes and the motion, and the clock offset is open by up to a quarter "
+            "period: without all axes, the phase of an orbit looks like a lag."
         )
     if r < _RESEMBLES:
         if lag.peak - lag.second_peak < CLOSE or r < 0.5:
