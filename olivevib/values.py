@@ -21,6 +21,29 @@ def id_list(text: str | None) -> tuple[int, ...]:
     return tuple(dict.fromkeys(ids))
 
 
+def sizes(text: str | None) -> tuple[float | None, dict[int, float]]:
+    """The size of all markers and the own sizes of some, mm, of "60" or "60,2:68.4".
+
+    UsageError for anything else.
+    """
+    whole: float | None = None
+    own: dict[int, float] = {}
+    try:
+        for part in (text or "").split(","):
+            marker, colon, size = part.strip().rpartition(":")
+            if colon:
+                own[int(marker)] = float(size)
+            elif part.strip():
+                whole = float(size)
+    except ValueError:
+        raise UsageError(
+            f"--size {text!r} is no size.",
+            "",
+            "Write millimetres as 60, or with odd ones 60,2:68.4.",
+        ) from None
+    return whole, own
+
+
 def band(text: str | None) -> tuple[float, float] | None:
     """The limits (5.0, 45.0) Hz of "5-45"; None for None. UsageError for anything else."""
     if text is None:

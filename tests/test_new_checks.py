@@ -77,9 +77,12 @@ def test_new_takes_the_exposure_and_tells_what_is_not_said(raw, monkeypatch, cap
     monkeypatch.chdir(raw)
     (raw / "trials").mkdir()
     words = ["new", "T1", "--left", "left.avi", "--right", "right.avi", "--exposure", "2.5"]
-    assert main(words) == 0
+    assert main([*words, "--size", "wide"]) == 2
+    assert main([*words, "--size", "2:68.4"]) == 0
+    markers = Trial.open(raw / "trials" / "T1").settings.markers
+    assert (markers.size_of(1), markers.size_of(2)) == (None, 68.4)
     cameras = Trial.open(raw / "trials" / "T1").settings.cameras
     assert (cameras.left.exposure_ms, cameras.right.exposure_ms) == (2.5, 2.5)
     told = capsys.readouterr().err
-    assert "not said: marker size" in told
+    assert "not said: band" in told
     assert "not said: exposure" not in told

@@ -231,7 +231,8 @@ def test_the_form_becomes_a_plan():
     [
         ("left", "", "“left recording”: the left recording is not named"),
         ("left", "gone.avi", "“left recording”: gone.avi is missing"),
-        ("size", "wide", "“marker size, mm”: 'wide' is no number"),
+        ("size", "wide", "“marker size, mm”: 'wide' cannot be read"),
+        ("size", "60,900:5", "“marker size, mm”: library olive49 has no marker 900"),
         ("size", "-1", "“marker size, mm” -1.0 is no size"),
         ("shutter", "fast", "“shutter”: 'fast' is not known"),
         ("ids", "1,x", "“marker ids”: '1,x' cannot be read"),

@@ -84,7 +84,7 @@ def _prepare_verbs(verbs: Any) -> None:
     new.add_argument("--board", metavar="SPEC", help="the calibration board (see below)")
     new.add_argument("--rig", metavar="FILE", help="rig.toml of an earlier calibration")
     new.add_argument("--markers", metavar="LIB", default="olive49", help="marker library")
-    new.add_argument("--size", type=float, metavar="MM", help="outer side of the dark square")
+    new.add_argument("--size", metavar="MM[,ID:MM]", help="outer side of the dark square; odd ones")
     new.add_argument("--ids", metavar="1,2,5-9", help="the markers on the tree (default: all)")
     new.add_argument("--shutter", choices=("rolling", "global"), help="how the sensors read out")
     new.add_argument("--row-time", metavar="US[,US]", help="microseconds per sensor row, signed")

@@ -27,6 +27,7 @@ def new(arguments: argparse.Namespace, console: Console) -> int:
     from olivevib import pipeline
     from olivevib.trial.workspace import find_preset, place_for_new
 
+    size, own_sizes = values.sizes(arguments.size)
     left_row, right_row = values.row_times(arguments.row_time)
     plan = pipeline.NewTrial(
         left=arguments.left,
@@ -36,7 +37,8 @@ def new(arguments: argparse.Namespace, console: Console) -> int:
         board=arguments.board,
         rig=arguments.rig,
         markers=arguments.markers,
-        size_mm=arguments.size,
+        size_mm=size,
+        sizes_mm=own_sizes,
         ids=values.id_list(arguments.ids),
         shutter=arguments.shutter,
         row_time_us=(left_row, right_row),

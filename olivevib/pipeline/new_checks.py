@@ -112,9 +112,10 @@ def _said(plan: NewTrial) -> Iterator[Fault]:
     """Numbers and names that cannot be."""
     if plan.board:
         yield from _tried("board", lambda: parse_board(str(plan.board)))
-    if plan.size_mm is not None and not plan.size_mm > 0:
-        error = UsageError(f"--size {plan.size_mm} is no size.", "", "Give millimetres above 0.")
-        yield Fault("size_mm", error)
+    for size in (plan.size_mm, *plan.sizes_mm.values()):
+        if size is not None and not size > 0:
+            error = UsageError(f"--size {size} is no size.", "", "Give millimetres above 0.")
+            yield Fault("size_mm", error)
     if plan.exposure_ms is not None and not 0 < plan.exposure_ms < 1000:
         what = f"--exposure {plan.exposure_ms:g} is no exposure."
         yield Fault("exposure_ms", UsageError(what, "", "Give milliseconds, such as 2."))
@@ -124,6 +125,7 @@ def _said(plan: NewTrial) -> Iterator[Fault]:
         yield Fault("markers", error)
         return
     yield from _tried("ids", lambda: only_known(library, plan.ids))
+    yield from _tried("size_mm", lambda: only_known(library, tuple(plan.sizes_mm)))
     yield from _sensor_marker(plan, library)
 
 

@@ -12,6 +12,7 @@ from olivevib.errors import UsageError
 if TYPE_CHECKING:
     from olivevib.pipeline import NewTrial
     from olivevib.trial import TrialSettings
+    from olivevib.trial.settings import Markers
 
 Value = TypeVar("Value")
 
@@ -51,7 +52,7 @@ FIELDS = (
     Field("calibration_right", "right board", "video or folder of stills", True),
     Field("board", "board", "coded:5x5,pitch=60,size=44 · charuco:4x5,square=54,…", choices=BOARDS),
     Field("rig", "or a rig", "rig.toml of an earlier calibration, instead of a board", True),
-    Field("size", "marker size, mm", "outer side of the dark square", choices=SIZES),
+    Field("size", "marker size, mm", "outer side of dark square; odd ones 60,2:68", choices=SIZES),
     Field("ids", "marker ids", "1,2,5-9; empty: every id of the library", choices=IDS),
     Field("markers", "marker library", "olive49, aruco:…, a TOML file", choices=LIBRARIES),
     Field("shutter", "shutter", "rolling or global; empty: unknown", choices=("rolling", "global")),
@@ -106,6 +107,7 @@ def plan_of(values: Mapping[str, str]) -> NewTrial:
     from olivevib.trial.workspace import find_preset
 
     said = {name: text.strip() for name, text in values.items() if text.strip()}
+    size, own_sizes = _read(said, "size", typed.sizes) or (None, {})
     left_row, right_row = _read(said, "row_time", typed.row_times) or (None, None)
     return NewTrial(
         left=said.get("left", ""),
@@ -115,7 +117,8 @@ def plan_of(values: Mapping[str, str]) -> NewTrial:
         board=said.get("board"),
         rig=said.get("rig"),
         markers=said.get("markers", "olive49"),
-        size_mm=number_in(said, "size"),
+        size_mm=size,
+        sizes_mm=own_sizes,
         ids=_read(said, "ids", typed.id_list) or (),
         shutter=_shutter(said),
         row_time_us=(left_row, right_row),
@@ -164,7 +167,7 @@ def values_of(
     shared = {
         "board": None if rig else calibration.board,
         "rig": str(place("rig.toml")) if rig else None,
-        "size": None if markers.size_mm is None else f"{markers.size_mm:g}",
+        "size": _sizes_text(markers),
         "ids": ",".join(map(str, markers.ids)),
         "markers": str(place(library)) if library.endswith(".toml") else library,
         "shutter": None if cameras.shutter == "unknown" else cameras.shutter,
@@ -177,6 +180,12 @@ def values_of(
         "machine": settings.machine.make,
     }
     return {name: f"{value}" for name, value in shared.items() if value}
+
+
+def _sizes_text(markers: Markers) -> str:
+    """The size of all markers and the own ones, as they are typed."""
+    whole = [] if markers.size_mm is None else [f"{markers.size_mm:g}"]
+    return ",".join([*whole, *(f"{m.id}:{m.size_mm:g}" for m in markers.marker if m.size_mm)])
 
 
 def trial_name(values: Mapping[str, str]) -> str:
