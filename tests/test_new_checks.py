@@ -57,7 +57,8 @@ def test_each_fault_names_its_field(raw):
     assert fields(plan(raw, ids=(1, 400))) == ["ids"]
     assert fields(plan(raw, size_mm=-1.0)) == ["size_mm"]
     assert fields(plan(raw, exposure_ms=0.0)) == ["exposure_ms"]
-    assert fields(plan(raw, ids=(1, 2), accelerometer_marker=3)) == ["accelerometer_marker"]
+    bound = plan(raw, ids=(1, 2), accelerometer=str(raw / "none.csv"), accelerometer_marker=3)
+    assert fields(bound) == ["accelerometer_marker", "accelerometer"]
     assert fields(plan(raw, accelerometer=str(raw / "none.csv"))) == ["accelerometer"]
 
 

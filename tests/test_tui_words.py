@@ -251,6 +251,7 @@ def test_a_fault_names_its_line_in_the_words_of_the_form(field, text, words, tmp
     for side in ("left", "right"):
         make_video(tmp_path / f"{side}.avi", frames=2)
     values = {"trial": "T01", "left": "left.avi", "right": "right.avi", field: text}
+    values |= {"accelerometer": "logger.csv"} if field == "accelerometer_marker" else {}
     looked = look_at(values, whole=True)
     assert looked.error is not None
     assert words in str(looked.error)
