@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import jinja2
@@ -61,8 +62,9 @@ SECTIONS = (
 )
 
 
+@cache
 def environment() -> jinja2.Environment:
-    """Templates that escape everything and refuse an unknown name."""
+    """Templates that escape everything and refuse an unknown name; compiled once a process."""
     return jinja2.Environment(
         loader=jinja2.PackageLoader("olivevib.report"),
         autoescape=True,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -46,14 +47,19 @@ def _spent() -> float:
 
 @dataclass
 class Batch:
-    """A batch as a process of its own, with the memory of its workers (Linux) as it goes on."""
+    """A batch as a process of its own, with the memory of its workers (Linux) as it goes on.
+
+    others_cores: how many cores the other programs of the machine used meanwhile.
+    """
 
     folder: Path
     workers: int
     peaks_mb: dict[int, list[float]] = field(default_factory=dict)
     wall_s: float = 0.0
+    others_cores: float = 0.0
 
     def __post_init__(self) -> None:
+        self.busy = busy_core_s()
         self.printed = tempfile.TemporaryFile("w+")  # noqa: SIM115 (as long as this object)
         self.started, self.before = time.monotonic(), _spent()
         verb = ("batch", "-q", "--json", "--workers", str(self.workers), str(self.folder))
@@ -70,6 +76,7 @@ class Batch:
             self.look()
             time.sleep(0.1)
         self.wall_s = time.monotonic() - self.started
+        self.others_cores = (busy_core_s() - self.busy - self.cpu_s) / self.wall_s
         self.printed.seek(0)
         rows: list[dict[str, Any]] = json.load(self.printed)["trials"]
         return rows
@@ -94,6 +101,15 @@ class Batch:
         """By how much a worker's peak rose after the first third of its looks."""
         grown = [max(p) - p[len(p) // 3] for p in self.peaks_mb.values() if len(p) > 9]
         return max(grown, default=float("nan"))
+
+
+def busy_core_s() -> float:
+    """Core seconds that all programs together have used since the start; NaN where not told."""
+    path = Path("/proc/stat")
+    if not path.exists():
+        return float("nan")
+    told = [int(word) for word in path.read_text().split("\n", 1)[0].split()[1:9]]
+    return (sum(told) - told[3] - told[4]) / os.sysconf("SC_CLK_TCK")  # but idle and waiting
 
 
 def _children(parent: int) -> Sequence[int]:
