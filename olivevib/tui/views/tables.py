@@ -159,7 +159,7 @@ def comparison_text(c: Comparison, palette: Palette) -> Text:
             f"\n{line.f_hz:.3f} Hz: "
             f"camera {line.optical_m_s2:.3f} ± {line.optical_sigma_m_s2:.3f}, "
             f"sensor {line.sensor_m_s2:.3f} ± {line.sensor_sigma_m_s2:.3f} m/s², "
-            f"phase {line.phase_deg:+.1f} ± {line.phase_sigma_deg:.1f}°"
+            f"phase {round(line.phase_deg, 1) + 0.0:+.1f} ± {line.phase_sigma_deg:.1f}°"
         )
     return out
 

@@ -20,7 +20,7 @@ Draw = Callable[[tuple[int, int], Palette], Text]
 
 def nothing(size: tuple[int, int], palette: Palette) -> Text:
     """The view of a pane that has not been given one."""
-    return Text("")
+    return Text("reading …", palette.muted)
 
 
 class Plot(Widget, can_focus=True):
