@@ -28,7 +28,7 @@ from olivevib.marker import (
 
 def scene(seed: int, size: float = 48, look: Look | None = None):
     rng = np.random.default_rng(seed)
-    canvas = Canvas(look=look or Look(samples=6), rng=rng)
+    canvas = Canvas(look=look or Look(), rng=rng)
     truth = {}
     for k, place in enumerate(PLACES):
         at = np.array(place) + rng.uniform(-5, 5, 2)
@@ -110,7 +110,7 @@ def test_motion_blur(path, share, limit):
 @pytest.mark.slow
 @pytest.mark.parametrize("psf", [0.4, 1.0, 1.5])
 def test_an_unknown_point_spread(psf):
-    canvas, truth = scene(6, look=Look(samples=20, psf_px=psf))
+    canvas, truth = scene(6, look=Look(samples=8, psf_px=psf))
     errors, flagged, normalised = measured(canvas.grey(), truth)
     assert len(errors) == 24
     assert not flagged.any()
@@ -130,7 +130,7 @@ def demosaiced(canvas: Canvas) -> np.ndarray:
 
 @pytest.mark.parametrize("spoilt", [jpeg, demosaiced])
 def test_ellipses_hold_where_noise_is_correlated(spoilt):
-    canvas, truth = scene(7, look=Look(samples=8))
+    canvas, truth = scene(7, look=Look())
     errors, flagged, normalised = measured(spoilt(canvas), truth)
     assert len(errors) == 24
     assert not flagged.any()
@@ -164,7 +164,7 @@ def test_a_foreign_square_is_fitted_as_well():
     errors = []
     for k in range(6):
         rng = np.random.default_rng(k)
-        canvas = Canvas(200, 200, Look(samples=16), rng=rng)
+        canvas = Canvas(200, 200, Look(samples=8), rng=rng)
         H = pose(6, 50, 30, rng.uniform(0, 360), rng.uniform(0, 360), (639.5, 359.5))
         H = np.array([[1, 0, -540.2], [0, 1, -259.7], [0, 0, 1.0]]) @ H
         dark = marker_modules(library, k)
@@ -272,7 +272,7 @@ def test_a_gradient_of_light_is_blurred_with_the_marker():
     errors, squares = [], []
     for seed in range(6):
         rng = np.random.default_rng(seed)
-        canvas = Canvas(200, 200, Look(25, 130, psf_px=1.0, samples=12), rng=rng)
+        canvas = Canvas(200, 200, Look(25, 130, psf_px=1.0, samples=8), rng=rng)
         H = pose(11, 48, 20, rng.uniform(0, 360), rng.uniform(0, 360), (639.8, 359.1))
         H = np.array([[1, 0, -540.0], [0, 1, -260], [0, 0, 1]]) @ H
         canvas.add(LIBRARY.layout.pattern(LIBRARY.codes[seed]), H / H[2, 2], slope=(0.02, 0.0))

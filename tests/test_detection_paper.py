@@ -31,7 +31,7 @@ def scene(
 ):
     """Markers 1…count in random azimuth and roll; the picture and H by id."""
     rng = np.random.default_rng(seed)
-    canvas = Canvas(look=look or Look(samples=6), rng=rng)
+    canvas = Canvas(look=look or Look(), rng=rng)
     if clutter:
         canvas.clutter(**clutter)
     truth = {}

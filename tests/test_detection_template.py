@@ -17,7 +17,7 @@ from olivevib.geometry import apply_homography, homography
 STONES = LIBRARY.layout.cornerstones
 
 
-def one_marker(size: float, tilt: float, seed: int, samples: int = 20, noise: float = 2.0):
+def one_marker(size: float, tilt: float, seed: int, samples: int = 8, noise: float = 2.0):
     """Noise-free levels (200, 200) of one marker, its H and row."""
     rng = np.random.default_rng(seed)
     canvas = Canvas(200, 200, Look(samples=samples, noise=noise), rng=rng)
@@ -35,7 +35,7 @@ def noisy(levels: np.ndarray, rng: np.random.Generator, sigma: float = 2.0) -> n
 
 @pytest.mark.parametrize(("size", "tilt"), [(24, 0), (32, 60), (64, 30)])
 def test_the_drawing_agrees_with_the_renderer(size, tilt):
-    canvas, H, row = one_marker(size, tilt, 1, samples=24)
+    canvas, H, row = one_marker(size, tilt, 1, samples=8)
     white = card(LIBRARY.layout.pattern(LIBRARY.codes[row]), 2)
     template = draw_template(white, H, Blur(0.49 + PIXEL_VARIANCE))
     y, x = np.mgrid[40:160, 40:160]
@@ -63,7 +63,7 @@ def test_centres_reach_the_bound_and_their_ellipses_hold(size, tilt, limit):
     rng = np.random.default_rng(size)
     errors, normalised, claimed = [], [], []
     for seed in range(12):
-        canvas, H, row = one_marker(size, tilt, seed, samples=20)
+        canvas, H, row = one_marker(size, tilt, seed, samples=8)
         white = card(LIBRARY.layout.pattern(LIBRARY.codes[row]), 2)
         corners = apply_homography(H, STONES)
         for _ in range(12):
@@ -114,7 +114,7 @@ def test_derivatives_of_points_against_refitting():
     ("size", "tilt"), [(24, 50), (32, 60), (48, 70), (64, 75), (64, 0), (96, 75)]
 )
 def test_steep_and_small_markers_are_found_and_measured(size, tilt):
-    grey, truth = scene(size + tilt, size, tilt, look=Look(samples=8))
+    grey, truth = scene(size + tilt, size, tilt, look=Look())
     found = TemplateReader(LIBRARY).detect(grey)
     assert [d.id for d in found] == sorted(truth)
     errors = np.array([d.centre_px - places(truth[d.id])[0] for d in found])

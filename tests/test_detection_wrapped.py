@@ -3,11 +3,11 @@
 import cv2
 import numpy as np
 import pytest
-from rendered_markers import F_PX, Z_MM
 
 from olivevib.detection import Detector, Wrapped
 from olivevib.geometry import rotation_from_vector
 from olivevib.marker import load_library
+from olivevib.studies.detection.canvas import F_PX, Z_MM
 
 LIBRARY = load_library("olive49")
 ROW = 3
