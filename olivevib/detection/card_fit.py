@@ -8,7 +8,8 @@ import numpy as np
 
 from olivevib.arrays import Floats, Grey
 from olivevib.detection.bend import Bend
-from olivevib.detection.refine import Fit, Pixels, Singles, approach, fit_template, marker_pixels
+from olivevib.detection.pixels import Pixels, Singles, marker_pixels
+from olivevib.detection.refine import Fit, approach, fit_template
 from olivevib.detection.smear import further_blur, motion_of, rounder
 from olivevib.detection.template import (
     COARSE,

@@ -14,14 +14,8 @@ import numpy as np
 
 from olivevib.arrays import Bools, Grey
 from olivevib.detection.card_fit import CardFit
-from olivevib.detection.refine import (
-    CLEAR,
-    Pixels,
-    Singles,
-    fit_template,
-    marker_pixels,
-    weights_in_place,
-)
+from olivevib.detection.pixels import Pixels, Singles, marker_pixels
+from olivevib.detection.refine import CLEAR, fit_template, weights_in_place
 from olivevib.detection.template import draw_template, module_px
 from olivevib.marker import MarkerLayout
 

@@ -20,7 +20,7 @@ from olivevib.detection.detection import Detection
 from olivevib.detection.fitted_points import image_homography, point_images
 from olivevib.detection.key import Key, change_of_shape, inside_image, make_key
 from olivevib.detection.key_fit import KeyBatch, KeyFits, batches_of, fit_keys
-from olivevib.detection.refine import Singles
+from olivevib.detection.pixels import Singles
 from olivevib.detection.search import Scene, patch_of, search, smeared_start
 from olivevib.detection.template import COARSE, LEAST_PATH_PX, Blur, draw_template
 from olivevib.detection.template_reader import SURE, Found

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from olivevib.arrays import Floats
 from olivevib.detection.noise import LAGS
-from olivevib.detection.refine import Singles, marker_pixels
+from olivevib.detection.pixels import Singles, marker_pixels
 from olivevib.detection.search import Patch, patch_of
 from olivevib.detection.template import REACH, Blur, Template, draw_template, module_px
 from olivevib.marker import MarkerLayout

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from olivevib.arrays import Bools, Floats, Grey
 from olivevib.detection.key import GEOMETRY, LIGHT, Key
-from olivevib.detection.refine import CLEAR, LEAST_GAIN, MOVED_PX, Singles, middle
+from olivevib.detection.pixels import Singles
+from olivevib.detection.refine import CLEAR, LEAST_GAIN, MOVED_PX, middle
 
 UNKNOWNS = GEOMETRY + LIGHT + 1
 COARSE_PASSES, FULL_PASSES = 2, 3

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from olivevib.arrays import Bools, Floats
 
 if TYPE_CHECKING:
-    from olivevib.detection.refine import Pixels, Singles
+    from olivevib.detection.pixels import Pixels, Singles
 
 LAGS = 2  # px, up to which noise may be correlated
 DOUBT = 3.0  # standard deviations that make a correlation of the noise believable

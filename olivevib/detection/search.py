@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Floats, Grey
-from olivevib.detection.refine import Singles
+from olivevib.detection.pixels import Singles
 from olivevib.detection.template import (
     COARSE,
     Blur,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Grey
-from olivevib.detection.refine import Pixels, Singles
+from olivevib.detection.pixels import Pixels, Singles
 
 CLOSED_MODULES = 3.2  # side of the closing that fills dark modules with the white around them
 SMOOTH_MODULES = 0.5  # blur of the light found by closing

@@ -14,7 +14,8 @@ import numpy as np
 from olivevib.arrays import Floats, Grey
 from olivevib.detection.bend import Bend, Wrapped, depths_px
 from olivevib.detection.card_fit import CardFit, blurred_pixels, plausible
-from olivevib.detection.refine import Singles, fit_template
+from olivevib.detection.pixels import Singles
+from olivevib.detection.refine import fit_template
 from olivevib.detection.smear import rounder
 from olivevib.detection.template import (
     Blur,
