@@ -92,6 +92,45 @@ def test_chessboards_counted_by_squares():
     )
 
 
+def followed(declared, frames):
+    """The causes of one diagnosis after the other, each with the board that the last proposed."""
+    causes, board = [], parse_board(declared)
+    for _ in range(4):
+        found = diagnose(board, frames)
+        causes.append(found.cause)
+        if found.board is None or found.board == board or found.cause == "sound":
+            return causes, found
+        assert found.board.spec in found.remedy or found.cause in ("mirrored", "unsteady")
+        board = found.board
+    return causes, found
+
+
+@pytest.mark.parametrize("declared", ["chessboard:8x6,square=40", CHARUCO])
+def test_what_is_proposed_for_a_chessboard_is_found_then(declared):
+    causes, _ = followed(declared, pictures(CHESS))
+    assert causes in (["wrong-counts", "sound"], ["wrong-kind", "sound"])
+
+
+@pytest.mark.parametrize("declared", [CHESS, "chessboard:6x8,square=40"])
+def test_a_chessboard_that_is_never_whole_asks_for_another_recording_not_another_board(
+    declared, monkeypatch
+):
+    """The finder that grows boards sees it, the one that measures does not: the hint went round."""
+    from olivevib.calibration import finding
+
+    monkeypatch.setitem(finding._SEARCHES, "chessboard", lambda board: lambda grey: None)
+    causes, found = followed(declared, pictures(CHESS))
+    assert causes == ["unsteady"]
+    assert "--board" not in found.remedy and "record again" in found.remedy
+
+
+@pytest.mark.parametrize("negative", ["", ",inverted"])
+def test_a_charuco_board_declared_as_a_chessboard(negative):
+    found = diagnose(parse_board("chessboard:9x6,square=54"), pictures(CHARUCO + negative))
+    assert found.cause == "wrong-kind" and "ChArUco" in found.text
+    assert f"charuco:4x5,square=54,marker=MM,dict=DICT_4X4_1000{negative}" in found.remedy
+
+
 def test_nothing_there_says_all_that_was_tried():
     rng = np.random.default_rng(0)
     empty = [cv2.GaussianBlur(rng.integers(0, 255, (240, 320), dtype=np.uint8), (0, 0), 3)]

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from olivevib.calibration import calibrate
-from olivevib.calibration.trust import cautions_of, judge_rig, sides_mm
+from olivevib.calibration.trust import cautions_of, exchanged, judge_rig, sides_mm
+from olivevib.calibration.uncertainty import point_sigma
 from olivevib.geometry import rotation_from_vector
 
 CORNERS = 30.0 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
@@ -72,6 +73,32 @@ def test_a_wrong_marker_size_is_told(rig):
     trust = judged(rig, bs.rig(), scale=1.03)
     assert codes(trust) == ["marker-size-contradicts"]
     assert trust.size_percent == pytest.approx(-2.9, abs=0.3)
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_swapped_recordings_are_told_from_a_bump(rig, parallel):
+    true = bs.rig()
+    if parallel:  # no epipolar line is missed then: the points come to lie behind the cameras
+        true = replace(true, right=true.left, R_right_left=np.eye(3),
+                       t_right_left_mm=np.array([-300.0, 0, 0]))  # fmt: skip
+        rig = replace(true, covariance=rig.covariance)
+    xyz = markers()
+    right, left = seen(true, xyz)
+    told = judge_rig(rig, left, right, sides_mm(xyz))
+    assert told.likely == "swapped" and codes(told) == ["recordings-swapped"]
+    assert told.exchanged_px < 0.5
+    assert codes(judge_rig(rig, right, left, sides_mm(xyz))) == []
+
+
+def test_a_pair_is_exchanged_with_its_covariance(rig):
+    back = exchanged(exchanged(rig))
+    assert np.allclose(back.t_right_left_mm, rig.t_right_left_mm)
+    assert np.allclose(back.covariance, rig.covariance, rtol=1e-3, atol=1e-12)
+    point = np.array([[50.0, -30, 1000]])
+    sigma = point_sigma(rig, point, (0.1, 0.1)).common_mm[0]
+    there = point_sigma(exchanged(rig), rig.to_right(point), (0.1, 0.1)).common
+    here = rig.R_right_left.T @ there[0] @ rig.R_right_left
+    assert np.linalg.norm(sigma) > 0 and np.trace(here) > 0
 
 
 def test_nothing_to_judge(rig):

@@ -4,9 +4,10 @@ from olivevib.calibration.boards import Board, board_from_table, parse_board
 from olivevib.calibration.calibrate import calibrate
 from olivevib.calibration.closed_form import ClosedForm, solve_closed
 from olivevib.calibration.coverage import Coverage
-from olivevib.calibration.diagnosis import Diagnosis, diagnose
+from olivevib.calibration.diagnosis import diagnose
 from olivevib.calibration.finding import BoardFinder, find_board
 from olivevib.calibration.holdout import HoldOut
+from olivevib.calibration.looks import Diagnosis
 from olivevib.calibration.paper import calibrate_paper
 from olivevib.calibration.result import (
     BoardPoses,

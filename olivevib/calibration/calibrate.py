@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from olivevib.calibration.bundle import RIGHT
+from olivevib.calibration.choice import choose
 from olivevib.calibration.closed_form import fixes_homography
 from olivevib.calibration.gather import gather, published_rig
 from olivevib.calibration.holdout import HoldOut, common_pairs, measure, with_tracks, without
@@ -16,7 +17,6 @@ from olivevib.calibration.outliers import Cleaned, drop_outliers
 from olivevib.calibration.quality import halves_test
 from olivevib.calibration.result import Calibration, ViewUse
 from olivevib.calibration.settings import CalibrationSettings
-from olivevib.calibration.thin import thin
 from olivevib.calibration.uncertainty import uncertainty
 from olivevib.calibration.views import BoardView
 from olivevib.errors import InputError
@@ -71,11 +71,12 @@ def _calibrated(pair: Pair, settings: CalibrationSettings, tick: Tick) -> Calibr
     tick(0, 4, "testing on unused frames")
     tested = cross_validate(pair, settings, tick)
     tick(1, 4, "solving with all frames")
-    cleaned = fit_all(thin(pair, settings.most_views), settings, tick)
+    choice = choose(pair, settings, tick)
+    cleaned = fit_all(choice.pair, settings, tick)
     tick(2, 4, "asking both halves")
     halves = halves_test(cleaned.fit)
     tick(3, 4, "judging")
-    return gather(pair, cleaned, tested, halves)
+    return replace(gather(pair, cleaned, tested, halves), choice=choice.words)
 
 
 def fit_all(pair: Pair, settings: CalibrationSettings, tick: Tick = silent) -> Cleaned:
@@ -144,7 +145,7 @@ def cross_validate(
     left = without(pair.left.views, [k for k, _ in test])
     right = without(pair.right.views, [m for _, m in test])
     cameras = (pair.left.camera, pair.right.camera)
-    train = thin(make_pair(left, right, cameras, settings), settings.most_views)
+    train = choose(make_pair(left, right, cameras, settings), settings, tick).pair
     cleaned = fit_all(train, settings, tick)
     rig = published_rig(cleaned.fit, uncertainty(cleaned.fit.problem, cleaned.fit.solution))
     scales = (cleaned.fit.lenses[0].scale, cleaned.fit.lenses[1].scale)

@@ -2,82 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
-import cv2
 import numpy as np
 
 from olivevib.arrays import Grey
 from olivevib.calibration.boards import Board
-from olivevib.calibration.finding import BoardFinder
 from olivevib.calibration.layouts import Markers, agreement, read_markers, rebuild
+from olivevib.calibration.looks import (
+    ENOUGH,
+    OTHER_DICTIONARIES,
+    Attempt,
+    Diagnosis,
+    Look,
+    as_is,
+    enough,
+    flipped,
+    inverted,
+    turned,
+    upside_down,
+    views_of,
+)
+from olivevib.calibration.other_kinds import carried_markers, plain_squares
 from olivevib.calibration.views import BoardView
 from olivevib.detection.detection import Reader
 from olivevib.progress import Tick, silent
-
-ENOUGH = 0.25  # share of the sample in which a board must be found to count as recognised
-OTHER_DICTIONARIES = (
-    *("DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000"),
-    *("DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_36H11", "DICT_ARUCO_MIP_36H12"),
-)
-
-Look = Callable[[Grey], Grey]
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """One way of looking: what was done, and in how many of the frames the board was found."""
-
-    what: str
-    found: int
-    of: int
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """What is the matter with a recording of the board.
-
-    cause: "sound", "inverted", "mirrored", "turned-180", "wrong-counts", "wrong-dictionary",
-    "wrong-ids" or "unknown"; text and remedy for people; board: the description that works (None
-    where none was found); attempts: all that was tried.
-    """
-
-    cause: str
-    text: str
-    remedy: str
-    board: Board | None
-    attempts: tuple[Attempt, ...]
-
-    @property
-    def tried(self) -> str:
-        """All that was tried, for people: ``inverted, mirrored, turned, ...``."""
-        return ", ".join(attempt.what for attempt in self.attempts[1:])
-
-
-def as_is(grey: Grey) -> Grey:
-    """The image itself."""
-    return grey
-
-
-def flipped(grey: Grey) -> Grey:
-    """The image with left and right exchanged."""
-    return np.ascontiguousarray(grey[:, ::-1])
-
-
-def turned(grey: Grey) -> Grey:
-    """The image turned by 90 degrees."""
-    return np.ascontiguousarray(np.rot90(grey))
-
-
-def upside_down(grey: Grey) -> Grey:
-    """The image turned by 180 degrees."""
-    return np.ascontiguousarray(grey[::-1, ::-1])
-
-
-def inverted(grey: Grey) -> Grey:
-    """The image with black and white exchanged."""
-    return np.asarray(255 - grey, dtype=np.uint8)
 
 
 def diagnose(
@@ -93,10 +43,9 @@ def diagnose(
     looks = _LOOKS[:1] if board.kind == "chessboard" else _LOOKS  # it looks the same in all
     for k, (cause, what, look) in enumerate(looks):
         tick(k, steps, what)
-        views = _views(board, frames, look, reader)
+        views = views_of(board, frames, look, reader)
         attempts.append(Attempt(what, len(views), len(frames)))
-        enough = len(views) >= max(1, ENOUGH * len(frames))
-        if enough and _carries(board, frames, look):
+        if enough(len(views), frames) and _carries(board, frames, look):
             return _found(cause, board, views, attempts)
     few = frames[:: max(1, len(frames) // 5)]
     if board.dictionary:
@@ -109,8 +58,8 @@ def diagnose(
         told = _other_ids(board, frames, reader, attempts)
         if told is not None:
             return told
-    else:
-        told = _other_corners(board, few, attempts)
+    for kind in (carried_markers, plain_squares):
+        told = kind(board, few, attempts)
         if told is not None:
             return told
     return _nothing(board, frames, attempts)
@@ -124,14 +73,6 @@ _LOOKS: tuple[tuple[str, str, Look], ...] = (
     ("turned-90", "turned by 90 degrees", turned),
     ("turned-180", "turned by 180 degrees", upside_down),
 )
-
-
-def _views(
-    board: Board, frames: Sequence[Grey], look: Look, reader: Reader | None
-) -> list[BoardView]:
-    finder = BoardFinder(board, reader)
-    seen = (finder.find(look(grey), k) for k, grey in enumerate(frames))
-    return [view for view in seen if view is not None]
 
 
 def _carries(board: Board, frames: Sequence[Grey], look: Look) -> bool:
@@ -223,9 +164,9 @@ def _other_counts(
     count = 0
     if best is not None:
         look = flipped if mirror else as_is
-        count = len(_views(best[0], frames, look, None))
+        count = len(views_of(best[0], frames, look, None))
     attempts.append(Attempt("other columns and rows", count, len(frames)))
-    if best is None or count < max(1, ENOUGH * len(frames)):
+    if best is None or not enough(count, frames):
         return None
     also = " The video is mirrored as well." if mirror else ""
     return Diagnosis(
@@ -251,9 +192,9 @@ def _other_dictionary(
             score = sum(agreement(trial, image) > 0 for image in readings)
             if score and name != board.dictionary and (best is None or score > best[1]):
                 best = (trial, score)
-    count = len(_views(best[0], frames, as_is, None)) if best is not None else 0
+    count = len(views_of(best[0], frames, as_is, None)) if best is not None else 0
     attempts.append(Attempt("other dictionaries", count, len(frames)))
-    if best is None or count < max(1, ENOUGH * len(frames)):
+    if best is None or not enough(count, frames):
         return None
     return Diagnosis(
         "wrong-dictionary",
@@ -282,38 +223,6 @@ def _other_ids(
         replace(board, first=int(often.min())),
         tuple(attempts),
     )
-
-
-def _other_corners(
-    board: Board, frames: Sequence[Grey], attempts: list[Attempt]
-) -> Diagnosis | None:
-    """Chessboards of any size: whatever the finder of growing boards reads in most frames."""
-    sizes = [size for grey in frames if (size := _chessboard_size(grey)) is not None]
-    most = max(set(sizes), key=sizes.count) if sizes else (0, 0)
-    count = sizes.count(most)
-    attempts.append(Attempt("other columns and rows", count, len(frames)))
-    if count < max(1, ENOUGH * len(frames)):
-        return None
-    columns, rows = most if board.columns >= board.rows else most[::-1]
-    works = replace(board, columns=columns, rows=rows)
-    return Diagnosis(
-        "wrong-counts",
-        f"The board has {columns}x{rows} inner corners, not {board.columns}x{board.rows}: found "
-        f"so in {count} of {len(frames)} frames.",
-        f"Use --board {works.spec}",
-        works,
-        tuple(attempts),
-    )
-
-
-def _chessboard_size(grey: Grey) -> tuple[int, int] | None:
-    """Inner corners of the largest chessboard in an image, the larger count first."""
-    flags = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
-    found, _, cells = cv2.findChessboardCornersSBWithMeta(grey, (3, 3), flags)
-    if not found:
-        return None
-    rows, columns = np.asarray(cells).shape[:2]
-    return max(rows, columns), min(rows, columns)
 
 
 def _nothing(board: Board, frames: Sequence[Grey], attempts: list[Attempt]) -> Diagnosis:

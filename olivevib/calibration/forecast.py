@@ -12,19 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from olivevib.arrays import Bools, Floats
-from olivevib.calibration.bundle import LAG, LEFT, RIGHT, STEREO, State
+from olivevib.calibration.bundle import LEFT, RIGHT, State
 from olivevib.calibration.calibrate import Size, make_pair_checked
+from olivevib.calibration.design import depth_slopes, expected_variance
 from olivevib.calibration.gather import published_rig
 from olivevib.calibration.joint import JointFit, fit_joint, fit_single
 from olivevib.calibration.settings import CalibrationSettings
 from olivevib.calibration.solve import Problem, Reduced, grams, reduce
-from olivevib.calibration.uncertainty import (
-    firm_inverse,
-    point_sigma,
-    rig_sensitivity,
-    uncertainty,
-    vector_jacobian,
-)
+from olivevib.calibration.uncertainty import point_sigma, uncertainty
 from olivevib.calibration.verdict import working_point
 from olivevib.calibration.views import BoardView
 from olivevib.errors import InputError
@@ -105,8 +100,8 @@ def best_next(fit: JointFit, rig: StereoRig, distance_mm: float) -> tuple[str, f
     each = reduce(problem, state, grams(problem, state)[0])
     now = reduce(fit.problem, fit.state, grams(fit.problem, fit.state)[0])
     slopes = depth_slopes(fit, rig, distance_mm)
-    before = _variance(slopes, now.total_H)
-    after = np.array([_variance(slopes, now.total_H + H) for H in _informed(each, seen)])
+    before = expected_variance(slopes, now.total_H)
+    after = np.array([expected_variance(slopes, now.total_H + H) for H in _informed(each, seen)])
     best = int(after.argmin())
     return words[best], float(np.sqrt(after[best] / before))
 
@@ -114,22 +109,6 @@ def best_next(fit: JointFit, rig: StereoRig, distance_mm: float) -> tuple[str, f
 def _informed(each: Reduced, seen: Bools) -> Floats:
     """Information of every candidate (C, p, p); none of those that are not seen by both."""
     return np.where(seen[:, None, None], each.H, 0.0)
-
-
-def _variance(slopes: Floats, information: Floats) -> float:
-    return float(np.einsum("ni,ij,nj->", slopes, firm_inverse(information), slopes))
-
-
-def depth_slopes(fit: JointFit, rig: StereoRig, distance_mm: float) -> Floats:
-    """Derivatives (5, p) of depth at five points of the working volume by the free THETA."""
-    middle = working_point(rig, distance_mm)
-    reach = 0.25 * distance_mm * np.array([[0, 0], [1, 1], [1, -1], [-1, 1], [-1, -1.0]])
-    points = middle + np.column_stack([reach, np.zeros(5)])
-    by_rig = rig_sensitivity(rig, points)[0][:, 2]
-    by_rig[:, STEREO][:, :3] = by_rig[:, STEREO][:, :3] @ vector_jacobian(rig.R_right_left)
-    out = np.zeros((5, fit.problem.free.size))
-    out[:, :LAG] = by_rig
-    return out[:, fit.problem.free]
 
 
 @dataclass(frozen=True)

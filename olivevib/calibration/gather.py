@@ -149,7 +149,7 @@ def views_of(pair: Pair, cleaned: Cleaned, residuals: Residuals) -> tuple[ViewUs
             mine = squares[frames == view.frame]
             reason = why.get((name, view.frame), why.get(("both", view.frame), ""))
             if not reason and view.frame not in used:
-                reason = "enough other views of this stretch"
+                reason = "tells less than the views that were chosen"
             rms = float(np.sqrt(mine.mean())) if mine.size and not reason else float("nan")
             use = ViewUse(name, view.frame, view.t_s, view.ids.size, not reason, reason, rms)
             out.append(use)

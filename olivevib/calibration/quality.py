@@ -24,11 +24,16 @@ SIDES = ("left", "right")
 
 
 def halves_test(fit: JointFit) -> tuple[HalfTest, ...]:
-    """First against second half, and even against odd views: whether they tell the same lens."""
+    """First against second half, and even against odd views: whether they tell the same lens.
+
+    Where neighbouring views err alike, even and odd stretches of so many.
+    """
     obs = fit.problem.observations
     seen, shared = np.unique(obs.pose), np.unique(obs.pose[obs.chain == RIGHT])
     order = np.arange(seen.size)
-    splits = {"first and second half": order < seen.size // 2, "even and odd views": order % 2 == 0}
+    alike = uncertainty(fit.problem, fit.solution).alike
+    even = "even and odd views" if alike == 1 else f"even and odd stretches of {alike} views"
+    splits = {"first and second half": order < seen.size // 2, even: order // alike % 2 == 0}
     out = []
     for name, first in splits.items():
         if min(np.isin(seen[part], shared).sum() for part in (first, ~first)) < LEAST_HALF:

@@ -104,7 +104,7 @@ class Calibration:
     bow_mm (3,): board height x^2, xy, y^2 at half its width. epipolar_rms_px: on unused frames
     where there are any, else on the fit. point_sigma_px: sigma of a board point in the left and the
     right image, so that the distances on unused frames come out as predicted.
-    method: "joint" or "paper".
+    method: "joint" or "paper". choice: why these views were solved for, empty where all were.
     """
 
     rig: StereoRig
@@ -130,6 +130,7 @@ class Calibration:
     cautions: tuple[Caution, ...]
     verdict: str
     method: str = "joint"
+    choice: str = ""
 
     def __post_init__(self) -> None:
         for name, n, nan in (

@@ -47,7 +47,8 @@ class CalibrationSettings:
     is, where frames carry stamps and the board moves; lag_range_s: how far the search goes;
     least_pairs: fewer common views are an error; common_points: points that both cameras must see
     for a view to count in the hold-out test; largest_dropped: share of views that may be dropped as
-    outliers; most_views: more common views than this are thinned by information; known_left,
+    outliers; most_views: of more common views than this those are chosen that tell
+    most; known_left,
     known_right: earlier calibrations of these cameras, with covariance, as prior knowledge.
     """
 

@@ -2,24 +2,26 @@
 
 Two tests that need no board: the markers' images must meet across the epipolar lines, and a
 marker's sides must come out as long as they are. A bumped tripod turns one camera; a changed focus
-stretches its picture: the misfits differ, so they can be told apart where markers are spread.
+stretches its picture: the misfits differ, so they can be told apart where markers are spread. Where
+the markers fit the rig with left and right exchanged, the recordings are swapped.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from olivevib.arrays import Bools, Floats
 from olivevib.calibration.rigid import triangulate
-from olivevib.calibration.uncertainty import rig_sensitivity
-from olivevib.errors import Caution
-from olivevib.geometry import StereoRig, rotation_from_vector
+from olivevib.calibration.uncertainty import rig_sensitivity, symmetric
+from olivevib.errors import Caution, InputError
+from olivevib.geometry import StereoRig, rotation_from_vector, vector_from_rotation
 
 LIMIT_Z = 4.0  # misfit over what rig and pixels allow
 LIMIT_PX, LIMIT_SIZE = 0.5, 0.01  # and at least so much
 SIDE_Z = 3.0
+CLEARLY = 4.0  # times smaller a misfit must be with left and right exchanged
 LEAST_MARKERS = 4
 TURN_RAD, STRETCH = 0.02, 0.05  # how far a bump turns, how far a focus stretches
 SHARED_PX = 0.1  # of what the localiser has in common in all frames (light, print, exposure)
@@ -32,7 +34,9 @@ class Trust:
     epipolar_px: rms misfit of the markers' mean images; expected_px: what rig and pixels allow;
     size_percent: measured side lengths over true ones, less 1; expected_percent: sigma that the rig
     allows. turned_deg and stretched_percent: the change of the right camera against the left that
-    explains the misfit best, each alone; likely: "turned", "stretched" or "" (holds, or not told).
+    explains the misfit best, each alone; likely: "swapped", "turned", "stretched" or "" (holds, or
+    not told). behind: share of the points that would lie behind a camera; exchanged_px: the misfit
+    with left and right exchanged (NaN: not asked).
     """
 
     markers: int
@@ -43,11 +47,13 @@ class Trust:
     turned_deg: float
     stretched_percent: float
     likely: str
+    behind: float = 0.0
+    exchanged_px: float = float("nan")
 
     @property
     def moved(self) -> bool:
-        """Whether the epipolar misfit is more than the rig allows."""
-        return self.epipolar_px > max(LIMIT_PX, LIMIT_Z * self.expected_px)
+        """Whether the epipolar misfit is more than the rig allows, or the points are nowhere."""
+        return self.behind > 0.5 or self.epipolar_px > max(LIMIT_PX, LIMIT_Z * self.expected_px)
 
     @property
     def resized(self) -> bool:
@@ -61,6 +67,36 @@ def judge_rig(rig: StereoRig, left_px: Floats, right_px: Floats, true_mm: Floats
 
     true_mm (M, 4): the true side lengths P1P2, P2P3, P3P4, P4P1. None without markers.
     """
+    as_is = _judged(rig, left_px, right_px, true_mm)
+    if as_is is not None and not as_is.moved:
+        return as_is
+    other = _judged(exchanged(rig), left_px, right_px, true_mm)
+    if other is None or other.moved or other.resized:
+        return as_is
+    seen = other if as_is is None else as_is
+    if as_is is not None and as_is.behind < 0.5 and as_is.epipolar_px < CLEARLY * other.epipolar_px:
+        return as_is
+    return replace(seen, likely="swapped", exchanged_px=other.epipolar_px)
+
+
+def exchanged(rig: StereoRig) -> StereoRig:
+    """The same pair with left and right exchanged, its covariance too."""
+    r, t = vector_from_rotation(rig.R_right_left), rig.t_right_left_mm
+    back = -rig.R_right_left.T @ t
+    cov = None
+    if rig.covariance is not None:
+        J, step = np.zeros((18, 18)), 1e-6
+        J[0:6, 6:12] = J[6:12, 0:6] = np.eye(6)
+        J[12:15, 12:15] = -np.eye(3)
+        J[15:18, 15:18] = -rig.R_right_left.T
+        for k in range(3):
+            turned = rotation_from_vector(r + step * np.eye(3)[k])
+            J[15:18, 12 + k] = (-turned.T @ t - back) / step
+        cov = symmetric(J @ rig.covariance @ J.T)
+    return StereoRig(rig.right, rig.left, rig.R_right_left.T, back, cov)
+
+
+def _judged(rig: StereoRig, left_px: Floats, right_px: Floats, true_mm: Floats) -> Trust | None:
     count = len(left_px)
     if not count:
         return None
@@ -81,6 +117,7 @@ def judge_rig(rig: StereoRig, left_px: Floats, right_px: Floats, true_mm: Floats
         turned_deg=turned,
         stretched_percent=stretched,
         likely=likely,
+        behind=float(np.mean((xyz[good][:, 2] <= 0) | (rig.to_right(xyz[good])[:, 2] <= 0))),
     )
 
 
@@ -168,6 +205,9 @@ def cautions_of(trust: Trust | None) -> tuple[Caution, ...]:
     if trust is None:
         return ()
     out = []
+    if trust.likely == "swapped":
+        error = swapped(trust)
+        return (Caution("recordings-swapped", f"{error.what} {error.why}", error.remedy),)
     if trust.moved:
         out.append(_moved(trust))
     if trust.resized:
@@ -182,6 +222,17 @@ def cautions_of(trust: Trust | None) -> tuple[Caution, ...]:
             )
         )
     return tuple(out)
+
+
+def swapped(trust: Trust) -> InputError:
+    """The error for recordings whose markers fit the rig with left and right exchanged."""
+    return InputError(
+        "the recordings of the trial are swapped: left is right.",
+        "Its markers fit the calibrated pair with left and right exchanged "
+        f"(to {trust.exchanged_px:.1f} px), and not as the recordings are named.",
+        "Exchange [cameras.left] and [cameras.right] in trial.toml (video, stamps, row time), and "
+        "run again; if it was the board's recordings that were swapped, exchange those.",
+    )
 
 
 def _moved(trust: Trust) -> Caution:

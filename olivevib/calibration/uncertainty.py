@@ -1,7 +1,7 @@
 """How well everything is known: covariance from the fit and from the scatter of whole views.
 
 Source: MacKinnon & White, Some heteroskedasticity-consistent covariance matrix estimators, 1985
-(the jackknife form), with the board view as the unit of chance.
+(the jackknife form), with the board view as the unit of chance, and neighbouring views correlated.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from olivevib.geometry import StereoRig, skew, vector_from_rotation
 
 LEVERAGE = 0.75  # 0.5: right on average for many views; 1: the jackknife, wide for few (simulated:
 # 97 % within two sigma at 20 stills, 98 % at ten)
+LEAST_ALIKE = 0.1  # correlation of neighbouring views below which they count as independent
+LEAST_BLOCKS = 6  # blocks of neighbouring views that tell a covariance
 
 
 @dataclass(frozen=True)
@@ -27,13 +29,15 @@ class Uncertainty:
 
     model: from the sigmas of the points; cluster: from the scatter of the views' gradients, so
     errors shared within a view count; published: the model widened where the views scatter more
-    than it says. pull (V,): g H^-1 g of each view, large where one view pulls hard.
+    than it says. pull (V,): g H^-1 g of each view, large where one view pulls hard; alike: how many
+    neighbouring views err alike.
     """
 
     model: Floats
     cluster: Floats
     published: Floats
     pull: Floats
+    alike: int
 
 
 def uncertainty(problem: Problem, solution: Solution) -> Uncertainty:
@@ -47,11 +51,13 @@ def uncertainty(problem: Problem, solution: Solution) -> Uncertainty:
     lever = np.eye(len(model)) - H @ model
     pulls = np.linalg.solve(lever, g[:, :, None])[:, :, 0] * np.sqrt((count - 1) / count)
     cluster = symmetric(model @ (pulls.T @ pulls + reduced.prior_matrix) @ model)
-    published = widen(model, H, g, reduced.prior_matrix)
+    lag = int(problem.free[:LAG].sum()) if problem.free[LAG] else None
+    size = alike_views(model, H, g)
+    published = widen(model, H, g, reduced.prior_matrix, size, lag)
     pull = np.zeros(used.size)
     pull[used] = np.einsum("vi,ij,vj->v", g, model, g)
     full = [_full(problem, matrix) for matrix in (model, cluster, published)]
-    return Uncertainty(full[0], full[1], full[2], pull)
+    return Uncertainty(full[0], full[1], full[2], pull, size)
 
 
 def firm_inverse(H: Floats) -> Floats:
@@ -63,29 +69,84 @@ def firm_inverse(H: Floats) -> Floats:
     return symmetric(inside * np.outer(scale, scale))
 
 
-def widen(model: Floats, H: Floats, g: Floats, prior_matrix: Floats) -> Floats:
+def widen(
+    model: Floats,
+    H: Floats,
+    g: Floats,
+    prior_matrix: Floats,
+    size: int = 1,
+    lag: int | None = None,
+) -> Floats:
     """The model covariance (p, p), widened wherever the views scatter more than it says.
 
-    H (V, p, p), g (V, p) information and gradient of each view. In the frame in which the model is
-    the unit matrix, the views' scatter, each view freed from its own leverage (Bell & McCaffrey,
-    2002), is shrunk towards its mean by as much as so few views make it uncertain (Ledoit & Wolf,
-    A well-conditioned estimator for large-dimensional covariance matrices, 2004); no direction
-    ends below the model.
+    H (V, p, p), g (V, p) information and gradient of each view, in the order of time; ``size``
+    neighbours err alike and count as one. In a frame in which the model is the unit matrix, the
+    scatter, each block of views freed from its own leverage (Bell & McCaffrey, 2002), is shrunk
+    towards its mean by as much as so few blocks make it uncertain (Ledoit & Wolf, A
+    well-conditioned estimator for large-dimensional covariance matrices, 2004); no direction ends
+    below the model. ``lag``: the parameter whose scatter from view to view the model holds already
+    (the jitter); it is shrunk towards its own scatter, not towards that of the others.
     """
-    sizes, vectors = np.linalg.eigh(model)  # a Cholesky factor fails where nothing is known
-    root = vectors * np.sqrt(np.maximum(sizes, 0.0))
-    lever, axes = np.linalg.eigh(symmetric(root.T @ H @ root))
-    free = np.maximum(1 - lever, 1e-3) ** -LEVERAGE
-    x = np.einsum("vij,vj,vkj,vk->vi", axes, free, axes, g @ root) * np.sqrt(len(g))
-    own = root.T @ prior_matrix @ root
-    scatter = x.T @ x / len(x) + own
-    mean, p = np.trace(scatter) / len(scatter), len(scatter)
-    spread = float(((scatter - mean * np.eye(p)) ** 2).sum())
+    root = factor(model, lag)
+    x = _freed(blocks(root.T @ H @ root, size), blocks(g @ root, size))
+    x = x * np.sqrt(len(x))
+    scatter = x.T @ x / len(x) + root.T @ prior_matrix @ root
+    target = np.full(len(scatter), np.trace(scatter) / len(scatter))
+    if lag is not None:
+        target[0], target[1:] = scatter[0, 0], np.diag(scatter)[1:].mean()
+    spread = float(((scatter - np.diag(target)) ** 2).sum())
     each = ((x * x).sum(axis=1) ** 2).sum() / len(x) ** 2 - ((x.T @ x / len(x)) ** 2).sum() / len(x)
     shrink = float(np.clip(each / max(spread, 1e-300), 0, 1))
-    values, turn = np.linalg.eigh(shrink * mean * np.eye(p) + (1 - shrink) * scatter)
+    values, turn = np.linalg.eigh(shrink * np.diag(target) + (1 - shrink) * scatter)
     whitened = turn @ np.diag(np.maximum(values, 1.0)) @ turn.T
     return symmetric(root @ whitened @ root.T)
+
+
+def _freed(H: Floats, g: Floats) -> Floats:
+    """Gradients (V, p) in the model's own frame, each freed from its own leverage H (V, p, p)."""
+    lever, axes = np.linalg.eigh(symmetric(H))
+    free = np.maximum(1 - lever, 1e-3) ** -LEVERAGE
+    return np.asarray(np.einsum("vij,vj,vkj,vk->vi", axes, free, axes, g), dtype=np.float64)
+
+
+def factor(model: Floats, first: int | None) -> Floats:
+    """A factor (p, p) of a covariance, model = factor factor^T; column 0 is parameter ``first``'s.
+
+    By eigenvalues, since a Cholesky factor fails where nothing is known.
+    """
+    rest, columns = model, []
+    if first is not None and model[first, first] > 0:
+        columns.append(model[:, first] / np.sqrt(model[first, first]))
+        rest = symmetric(model - np.outer(columns[0], columns[0]))
+    sizes, vectors = np.linalg.eigh(rest)
+    root = vectors * np.sqrt(np.maximum(sizes, 0.0))
+    if columns:
+        return np.column_stack([columns[0], root[:, 1:]])  # the smallest is that of ``first``: none
+    return np.asarray(root, dtype=np.float64)
+
+
+def alike_views(model: Floats, H: Floats, g: Floats) -> int:
+    """How many neighbouring views, in the order of time, err alike and count as one.
+
+    model (p, p), H (V, p, p), g (V, p): covariance, information and gradient of each view.
+
+    Neighbouring frames of a waved board do (the same corners on the same pixels, the same motion).
+    Twice the lag at which the correlation, over all directions together, is gone; at least
+    ``LEAST_BLOCKS`` blocks remain. Source: Carlstein, The use of subseries values, 1986 (blocks).
+    """
+    root = factor(model, None)
+    x = _freed(root.T @ H @ root, g @ root)
+    square, most = float((x * x).sum()), max(len(x) // LEAST_BLOCKS, 1)
+    gone = 2 / np.sqrt(max(x.size, 1))
+    for k in range(1, most // 2 + 1):
+        if float((x[k:] * x[:-k]).sum()) < max(gone, LEAST_ALIKE) * square:
+            return max(2 * (k - 1), 1)
+    return most
+
+
+def blocks(values: Floats, size: int) -> Floats:
+    """Sums over blocks of ``size`` neighbouring rows (the last block may be shorter)."""
+    return np.add.reduceat(values, np.arange(0, len(values), size), axis=0)
 
 
 def symmetric(matrix: NDArray[np.floating[Any]]) -> Floats:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from olivevib.arrays import Floats
-from olivevib.calibration.trust import cautions_of
+from olivevib.calibration.trust import cautions_of, swapped
 from olivevib.errors import Caution, InputError
 from olivevib.files.store import write_stage
 from olivevib.geometry import StereoRig
@@ -59,6 +59,9 @@ def reconstruct(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
             "Check --markers and --ids (markers.library, markers.ids in trial.toml).",
         )
     corners = {i: corners_mm(library, trial.settings, i) for i in sorted(ids)}
+    trust = rig_trust(tracks, rig, corners)
+    if trust is not None and trust.likely == "swapped":
+        raise swapped(trust)
     clock = trial_clock(trial, tracks)
     if clock.source == "unknown" and not trial.settings.reconstruction.paper:
         clock = clock_from_motion(tracks.left, tracks.right, rig, clock)
@@ -75,8 +78,7 @@ def reconstruct(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     if not (trial.settings.reconstruction.paper or _settled(trial, tracks, clock)):
         result = with_motion(trial, tracks, rig, corners, result, tick)
     result = _in_its_frame(trial, result, rig, tick)
-    told = cautions_of(rig_trust(tracks, rig, corners))
-    result = replace(result, cautions=(*result.cautions, *told))
+    result = replace(result, cautions=(*result.cautions, *cautions_of(trust)))
     write_stage(trial.folder / "trajectory.h5", trajectory_file(result, now))
     return result.cautions
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 
-from olivevib.arrays import Grey
+from olivevib.arrays import Floats, Grey
 from olivevib.calibration import (
     Board,
     BoardView,
@@ -18,6 +17,7 @@ from olivevib.calibration import (
     diagnose,
     parse_board,
 )
+from olivevib.calibration.trust import cautions_of, judge_rig, sides_mm
 from olivevib.errors import Caution, InputError
 from olivevib.geometry import CameraModel, StereoRig, rotation_from_vector
 from olivevib.pipeline.recordings import check_counts, check_sizes
@@ -28,21 +28,10 @@ from olivevib.simulation.render import Renderer
 from olivevib.simulation.scene import Body, Camera, Optics, Scene
 from olivevib.simulation.surroundings import Surroundings
 from olivevib.studies.calibration import scenes
-from olivevib.studies.calibration.recorded import (
-    FOLDER,
-    SETS,
-    WEBCAM,
-    WEBCAM_SIZE,
-    frames,
-    stills,
-    there,
-    webcams,
-)
 from olivevib.studies.study import Cell, Effort, Goal, Study, Table
 
 CHARUCO = "charuco:4x5,square=54,marker=40.5,dict=DICT_4X4_1000"
 PICTURES = 6
-HARMLESS = {"late-camera", "bent-board", "uneven-stamps", "few-common-views", "cameras-swapped"}
 
 
 @dataclass(frozen=True)
@@ -68,19 +57,23 @@ def run(effort: Effort, tick: Tick) -> Study:
     for n, (name, fault) in enumerate(faults.items()):
         tick(n, len(faults), name)
         seeded.append(fault(effort))
-    alarms = _alarms(effort, tick)
+    from olivevib.studies.calibration.alarms import sound_recordings
+
+    alarms = sound_recordings(effort, tick)
     named = sum(s.named for s in seeded)
-    false = sum(bool(words) for _, words in alarms)
+    false = sum(bool(a.false) for a in alarms)
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (s.fault, "yes" if s.named else "NO", ", ".join(s.said), s.text, s.remedy) for s in seeded
     )
-    sound: tuple[tuple[Cell, ...], ...] = tuple((n, ", ".join(w) or "none") for n, w in alarms)
+    sound: tuple[tuple[Cell, ...], ...] = tuple(
+        (a.recording, ", ".join(a.false) or "none", "; ".join(a.right) or "none") for a in alarms
+    )
     return Study(
         name="calibration-faults",
         title="Twelve seeded faults, and alarms on sound recordings",
         tables=(
             Table("Faults", ("fault", "named", "as", "told", "remedy"), rows),
-            Table("Sound recordings", ("recording", "alarms"), sound),
+            Table("Sound recordings", ("recording", "false alarms", "right, and why"), sound),
         ),
         goals=(
             Goal("seeded faults named with a remedy", "12 of 12", f"{named} of {len(seeded)}",
@@ -188,39 +181,44 @@ def _cautioned(fault: str, wanted: tuple[str, ...], cautions: Sequence[Caution])
     return Seeded(fault, wanted, tuple(c.code for c in cautions), text, remedy)
 
 
-def _recording(effort: Effort, where: int, rig: StereoRig | None = None, **how: float):  # type: ignore[no-untyped-def]
+def recording(effort: Effort, where: int, rig: StereoRig | None = None, **how: float):  # type: ignore[no-untyped-def]
+    """Board views of a simulated pair; ``how`` changes the waving."""
     waving = replace(scenes.Waving(15.0, 6.0), **how)
     return scenes.waved(rig or scenes.converging("0.10/-0.20"), waving, effort.draws(80, where))
 
 
-def _solved(left: Sequence[BoardView], right: Sequence[BoardView], **more: object) -> Calibration:
+def solved(left: Sequence[BoardView], right: Sequence[BoardView], **more: object) -> Calibration:
+    """The calibration of a simulated pair."""
     settings = replace(CalibrationSettings(), **more)  # type: ignore[arg-type]
     return calibrate(left, right, scenes.SIZE, scenes.SIZE, settings)
 
 
 def _wrong_size(effort: Effort) -> Seeded:
     """The trial's own markers, of known size, contradict a board whose squares are 3 % smaller."""
-    from olivevib.calibration.trust import cautions_of, judge_rig, sides_mm
-
-    left, right = _recording(effort, 1)
+    left, right = recording(effort, 1)
     wrong = [[replace(v, board_mm=1.03 * v.board_mm) for v in views] for views in (left, right)]
-    rig = _solved(wrong[0], wrong[1]).rig
-    true = scenes.converging("0.10/-0.20")
-    rng = effort.draws(81)
-    corners = 30.0 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    places = rng.uniform([-250, -150, 1000], [250, 150, 1300], (6, 3))
-    xyz = np.array([corners @ scenes.tilt(rng).T + place for place in places])
-    images = [
-        true.left.project(xyz.reshape(-1, 3)), true.right.project(true.to_right(xyz.reshape(-1, 3)))
-    ]  # fmt: skip
-    a, b = (px.reshape(-1, 4, 2) for px in images)
-    told = cautions_of(judge_rig(rig, a, b, sides_mm(xyz)))
+    rig = solved(wrong[0], wrong[1]).rig
+    told = cautions_of(judge_rig(rig, *_markers(effort)))
     return _cautioned("wrong square size", ("marker-size-contradicts",), told)
 
 
+def _markers(effort: Effort) -> tuple[Floats, Floats, Floats]:
+    """Corners (6, 4, 2) of a trial's markers in the left and the right image, sides (6, 4)."""
+    true, rng = scenes.converging("0.10/-0.20"), effort.draws(81)
+    corners = 30.0 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    places = rng.uniform([-250, -150, 1000], [250, 150, 1300], (6, 3))
+    xyz = np.array([corners @ scenes.tilt(rng).T + place for place in places])
+    flat = xyz.reshape(-1, 3)
+    a, b = true.left.project(flat), true.right.project(true.to_right(flat))
+    return a.reshape(-1, 4, 2), b.reshape(-1, 4, 2), sides_mm(xyz)
+
+
 def _swapped(effort: Effort) -> Seeded:
-    left, right = _recording(effort, 2)
-    return _cautioned("cameras swapped", ("cameras-swapped",), _solved(right, left).cautions)
+    """The trial's recordings are exchanged; the rig is that of the pair as it stands."""
+    rig = solved(*recording(effort, 2)).rig
+    left, right, true_mm = _markers(effort)
+    told = cautions_of(judge_rig(rig, right, left, true_mm))
+    return _cautioned("cameras swapped", ("recordings-swapped",), told)
 
 
 def _counts(effort: Effort) -> Seeded:
@@ -231,7 +229,7 @@ def _counts(effort: Effort) -> Seeded:
 
 def _late(effort: Effort) -> Seeded:
     return _cautioned(
-        "late camera", ("late-camera",), _solved(*_recording(effort, 3, lag_s=0.04)).cautions
+        "late camera", ("late-camera",), solved(*recording(effort, 3, lag_s=0.04)).cautions
     )
 
 
@@ -246,7 +244,7 @@ def _frontal(effort: Effort) -> Seeded:
         ):
             noisy = px + 0.1 * rng.standard_normal(px.shape)
             side.append(BoardView(k, float("nan"), np.arange(25), noisy, board, np.full(25, 0.1)))
-    told = _solved(sides[0], sides[1]).cautions
+    told = solved(sides[0], sides[1]).cautions
     return _cautioned("all frontal", ("frontal-views", "focal-uncertain"), told)
 
 
@@ -267,7 +265,7 @@ def _bent(effort: Effort) -> Seeded:
         ):
             noisy = px + 0.1 * rng.standard_normal(px.shape)
             side.append(BoardView(k, float("nan"), np.arange(25), noisy, board, np.full(25, 0.1)))
-    return _cautioned("bent board", ("bent-board",), _solved(sides[0], sides[1]).cautions)
+    return _cautioned("bent board", ("bent-board",), solved(sides[0], sides[1]).cautions)
 
 
 def _focus(effort: Effort) -> Seeded:
@@ -275,55 +273,9 @@ def _focus(effort: Effort) -> Seeded:
     rig = scenes.converging("0.10/-0.20")
     lens = rig.right.lens * np.array([1.02, 1.02, 1, 1, 1, 1])
     other = replace(rig, right=rig.right.with_lens(lens))
-    left, right = _recording(effort, 4)
-    _, later = _recording(effort, 4, other)
+    left, right = recording(effort, 4)
+    _, later = recording(effort, 4, other)
     middle = right[len(right) // 2].frame
     mixed = [v for v in right if v.frame < middle] + [v for v in later if v.frame >= middle]
-    told = _solved(left, mixed).cautions
+    told = solved(left, mixed).cautions
     return _cautioned("focus changed", ("halves-contradict",), told)
-
-
-# --- sound recordings
-
-
-def _alarms(effort: Effort, tick: Tick) -> list[tuple[str, list[str]]]:
-    """Cautions beyond what is true of a recording; words of the diagnosis that are wrong."""
-    out = []
-    for spec in (CHARUCO, "arucogrid:4x3,size=50,gap=20,dict=DICT_6X6_250",
-                 "chessboard:7x5,square=40"):  # fmt: skip
-        board = parse_board(spec)
-        found = diagnose(board, pictures(board, PICTURES, effort.draws(84)))
-        wrong = [found.cause] if found.cause != "sound" or "turned" in found.text else []
-        out.append((f"rendered {board.kind}", wrong))
-    for k in range(effort.count(4, 1)):
-        tick(k, 4, "sound: simulated")
-        left, right = _recording(effort, 100 + k)
-        out.append((f"simulated {k + 1}", _wrongly(_solved(left, right))))
-    if there():
-        out += _recorded(effort, tick)
-    return out
-
-
-def _recorded(effort: Effort, tick: Tick) -> list[tuple[str, list[str]]]:
-    out = []
-    network = webcams("A", tick)
-    pairs = list(combinations(range(4), 2)) if effort.share >= 0.5 else [(0, 2)]
-    for a, b in pairs:
-        result = calibrate(network[a].views, network[b].views, WEBCAM_SIZE, WEBCAM_SIZE)
-        out.append((f"A {a}-{b}", _wrongly(result)))
-    for k in range(4 if effort.share >= 0.5 else 1):
-        some = frames(FOLDER / SETS["A"] / f"cam_{k}.mp4")[::5]
-        found = diagnose(parse_board(WEBCAM), some)
-        wrong = [found.text] if found.cause != "sound" or "turned" in found.text else []
-        out.append((f"A {k}, diagnosis", wrong))
-    sets = [
-        stills("opencv_stereo_chess13", f"{side}*.jpg", "chessboard:9x6,square=25")
-        for side in ("left", "right")
-    ]
-    result = calibrate(sets[0][0], sets[1][0], sets[0][1], sets[1][1])
-    out.append(("OpenCV's 13 pairs", _wrongly(result)))
-    return out
-
-
-def _wrongly(result: Calibration) -> list[str]:
-    return [c.code for c in result.cautions if c.code not in HARMLESS]

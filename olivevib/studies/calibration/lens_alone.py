@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from olivevib.arrays import Floats
-from olivevib.calibration import BoardView, CalibrationSettings, solve_closed
+from olivevib.calibration import BoardView, CalibrationSettings, Shutter, solve_closed
 from olivevib.calibration.assemble import Side, shape_of
 from olivevib.calibration.closed_form import fixes_homography
 from olivevib.calibration.lens import LensFit, fit_lens, mono_prior
@@ -21,19 +21,34 @@ Method = Callable[[Sequence[BoardView], Size], Floats]
 NO_LENS = np.full(6, np.nan)
 
 
-def fit(views: Sequence[BoardView], size_px: Size) -> LensFit:
-    """Our fit of one camera from its own views, without stamps."""
+def fit(views: Sequence[BoardView], size_px: Size, recording: Sequence[BoardView] = ()) -> LensFit:
+    """Our fit of one camera from its own views.
+
+    ``recording``: all views of the video that they are of, whose stamps tell how the board moved in
+    each, so that a rolling shutter is estimated as in ``calibrate``; without it they are stills.
+    """
     width, height = size_px
     K = np.array([[width, 0, (width - 1) / 2], [0, width, (height - 1) / 2], [0, 0, 1.0]])
     good = tuple(view for view in views if fixes_homography(view))
-    side = Side(good, good, CameraModel(size_px, K, np.zeros(5)), False, height / 2, 0.0)
-    prior = mono_prior(CalibrationSettings().lens, side, None, 0.0)
+    tracks, timed = tuple(recording) or good, bool(recording)
+    side = Side(good, tracks, CameraModel(size_px, K, np.zeros(5)), timed, height / 2, 0.0)
+    readout_s = Shutter().unknown_readout_s() if timed else 0.0
+    prior = mono_prior(CalibrationSettings().lens, side, None, readout_s / height)
     return fit_lens(side, shape_of(good), prior)
 
 
 def ours(views: Sequence[BoardView], size_px: Size) -> Floats:
     """fx, fy, cx, cy, k1, k2 by our fit (6,)."""
     return fit(views, size_px).camera.lens
+
+
+def of_video(recording: Sequence[BoardView]) -> Method:
+    """The same for views of one video, whose other frames tell how the board moved."""
+
+    def method(views: Sequence[BoardView], size_px: Size) -> Floats:
+        return fit(views, size_px, recording).camera.lens
+
+    return method
 
 
 def with_sigma(views: Sequence[BoardView], size_px: Size) -> tuple[Floats, Floats]:

@@ -10,6 +10,7 @@ from olivevib.arrays import Floats
 from olivevib.calibration import BoardView
 from olivevib.progress import Tick
 from olivevib.studies.calibration import lens_alone, scenes
+from olivevib.studies.calibration.lens_alone import METHODS, Method
 from olivevib.studies.calibration.recorded import WEBCAM_SIZE, there, webcams
 from olivevib.studies.study import Cell, Chart, Curve, Effort, Goal, Study, Table
 
@@ -18,6 +19,7 @@ ORDERS, TRIALS = 10, 20
 NOISE_PX = (0.05, 0.1, 0.2)
 PATTERNS = ((5, 5), (5, 4), (5, 3), (5, 2), (3, 3), (3, 2), (2, 2))
 ASKED_A0 = np.array([3.0, 3.0, 2.5, 3.0])
+OURS = "ours, frames of a video"  # stamps and neighbouring frames tell a rolling shutter
 FALSE_MINIMUM = 0.15  # of the focal length of all views; the closed form alone is that far off
 
 
@@ -47,7 +49,7 @@ def run(effort: Effort, tick: Tick) -> Study:
 def repeated(
     views: Sequence[BoardView],
     size_px: tuple[int, int],
-    method: str,
+    method: Method,
     orders: int,
     rng: np.random.Generator,
     nested: bool = True,
@@ -59,7 +61,7 @@ def repeated(
         for n, count in enumerate(COUNTS):
             pick = order[:count] if nested else rng.permutation(len(views))[:count]
             if len(views) >= count:
-                out[k, n] = lens_alone.METHODS[method]([views[i] for i in pick], size_px)[:4]
+                out[k, n] = method([views[i] for i in pick], size_px)[:4]
     return out
 
 
@@ -81,24 +83,28 @@ def _recorded(effort: Effort, tick: Tick) -> tuple[Table, list[Goal]]:
     rows: list[tuple[Cell, ...]] = []
     goals: list[Goal] = []
     orders = effort.count(ORDERS, 2)
-    methods = list(lens_alone.METHODS)
     failed, astray, worst = 0, 0, ("", 0.0)
     for name in ("A", "C"):
         for camera in webcams(name, tick).values():
             views = [view for view in camera.views if view.ids.size >= 8]
             if len(views) < COUNTS[-1]:
                 continue
-            whole = lens_alone.ours(views, WEBCAM_SIZE)
-            for m, method in enumerate(methods):
+            ours = lens_alone.of_video(camera.views)
+            whole = ours(views, WEBCAM_SIZE)
+            methods = {
+                **{f"{label}, stills": how for label, how in METHODS.items()},
+                OURS: ours,
+            }
+            for m, (method, how) in enumerate(methods.items()):
                 tick(m, len(methods), f"camera {camera.name}, {method}")
                 rng = effort.draws(62, ord(name), int(camera.name[1:]))
-                found = repeated(views, WEBCAM_SIZE, method, orders, rng)
+                found = repeated(views, WEBCAM_SIZE, how, orders, rng)
                 sd, fails = scatter(found), failures(found, WEBCAM_SIZE[0])
                 off = np.abs(found[:, :, 0] / whole[0] - 1) > FALSE_MINIMUM
                 share = 100 * float(sd[:2].max() / whole[0])
                 rows.append((camera.name, method, *(round(float(v), 1) for v in sd), fails,
                              int(off.sum()), round(share, 2)))  # fmt: skip
-                if method != "ours":
+                if method != OURS:
                     continue
                 failed, astray = failed + fails, astray + int(off.sum())
                 worst = max(worst, (camera.name, share), key=lambda w: w[1])
@@ -137,8 +143,9 @@ def _simulated(effort: Effort, tick: Tick) -> Table:
                 ("closed, independent", "closed form", pools, False),
                 ("ours, nested", "ours", sets, True),
             ):
+                how = METHODS[method]
                 found = np.concatenate([
-                    repeated(views, scenes.SIZE, method, 1, rng, nested) for views in source
+                    repeated(views, scenes.SIZE, how, 1, rng, nested) for views in source
                 ])  # fmt: skip
                 sd, bias = scatter(found), np.nanmedian(found[:, -1, 0]) - 990.0
                 rows.append((name, noise, label, *(round(float(v), 2) for v in sd),
@@ -154,7 +161,9 @@ def _fig_15(effort: Effort) -> Chart:
     views = scenes.tilted(lens, scenes.grid(), COUNTS[-1], 0.1, rng)
     x = np.array(COUNTS, dtype=np.float64)
     curves = [
-        Curve(method, x, repeated(views, scenes.SIZE, method, 1, effort.draws(16))[0, :, 0])
+        Curve(
+            method, x, repeated(views, scenes.SIZE, METHODS[method], 1, effort.draws(16))[0, :, 0]
+        )
         for method in ("closed form", "ours")
     ]
     curves.append(Curve("truth", x, np.full(x.size, 990.0)))
@@ -204,7 +213,7 @@ def _trials(
     for _ in range(trials):
         views = scenes.tilted(lens, board, 10, 0.1, rng)
         for method, values in out.items():
-            values.append(float(lens_alone.METHODS[method](views, scenes.SIZE)[0]))
+            values.append(float(METHODS[method](views, scenes.SIZE)[0]))
     return out
 
 

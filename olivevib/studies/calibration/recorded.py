@@ -42,10 +42,19 @@ def frames(path: Path) -> list[Grey]:
 
 def stamps(name: str, camera: int) -> Floats:
     """Stamps of one camera's frames on a straight line, as the stages use them, s."""
-    table = np.genfromtxt(FOLDER / SETS[name] / "timestamps.csv", delimiter=",", names=True)
-    raw = table["frame_time"][table["cam_id"] == camera]
+    raw = _raw_stamps(name, camera)
     count = np.arange(raw.size)
     return np.asarray(np.polyval(np.polyfit(count, raw, 1), count), dtype=np.float64)
+
+
+def stamps_off_s(name: str, camera: int) -> Floats:
+    """How far each stamp of the recording lies off that line, s."""
+    return np.asarray(_raw_stamps(name, camera) - stamps(name, camera), dtype=np.float64)
+
+
+def _raw_stamps(name: str, camera: int) -> Floats:
+    table = np.genfromtxt(FOLDER / SETS[name] / "timestamps.csv", delimiter=",", names=True)
+    return np.asarray(table["frame_time"][table["cam_id"] == camera], dtype=np.float64)
 
 
 def webcams(name: str, tick: Tick) -> dict[int, Camera]:
