@@ -123,6 +123,8 @@ def _line(line: Line, fit: MotionFit, marker: FittedMarker | None, derivative: i
         reasons=(*fit.reasons, *fit.next_time),
         **_frequencies(fit),
     )
+    if fit.status is LineStatus.BLIND:
+        return replace(told, **_UNKNOWN)
     if not decided(fit):
         return told
     base = replace(told, unit="mm", **_amplitudes(fit, marker))
@@ -137,6 +139,14 @@ def _line(line: Line, fit: MotionFit, marker: FittedMarker | None, derivative: i
         phase_rad=base.phase_rad + derivative * np.pi / 2,
         harmonics=scaled.harmonics,
     )
+
+
+_UNKNOWN: dict[str, Any] = {  # of a line that may as well be sway
+    "amplitude": np.full(3, np.nan),
+    "amplitude_sigma": np.full(3, np.nan),
+    "phase_rad": np.full(3, np.nan),
+    "harmonics": np.empty((0, 3)),
+}
 
 
 def _frequencies(fit: MotionFit) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import numpy as np
 from olivevib.comparison import Verdict
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
-from olivevib.report.lines import MEANING, MOST, OPEN, candidates_text, describe
+from olivevib.report.lines import KNOWN, MEANING, MOST, OPEN, candidates_text, describe
 from olivevib.report.tables import candidate_accelerations
 from olivevib.report.words import count, measure, number, percent, triple
 from olivevib.vibration.types import Line, LineStatus
@@ -85,8 +85,10 @@ def _seen(content: ReportContent) -> str:
 def strongest(content: ReportContent) -> tuple[int, Line] | None:
     """The marker whose line is largest, and that line."""
     lines = {
-        i: line for i, line in content.lines().items() if np.isfinite(line.amplitude).all()
-    }  # fmt: skip
+        i: line
+        for i, line in content.lines().items()
+        if np.isfinite(line.amplitude).all() and line.status in (*KNOWN, *OPEN)
+    }
     if not lines:
         return None
     best = max(lines, key=lambda i: float(np.sum(lines[i].amplitude ** 2)))
