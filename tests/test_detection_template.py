@@ -9,7 +9,8 @@ from rendered_markers import Canvas, Look, pose
 from test_detection_paper import LIBRARY, PLACES, no_marker, places, scene
 
 from olivevib.detection.fitted_points import point_jacobian
-from olivevib.detection.refine import fit_template, marker_pixels
+from olivevib.detection.pixels import marker_pixels
+from olivevib.detection.refine import fit_template
 from olivevib.detection.template import PIXEL_VARIANCE, Blur, card, draw_template
 from olivevib.detection.template_reader import TemplateReader
 from olivevib.geometry import apply_homography, homography
