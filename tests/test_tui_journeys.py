@@ -382,7 +382,7 @@ async def test_markers_are_found_in_one_picture_with_the_parameters_of_now(works
         scene.marker_video(folder / f"{side}.avi", 5)
     async with started(workspace) as (app, pilot):
         await press(pilot, "enter", "k", "i")
-        assert "1 markers found in this picture alone" in screen_text(app)
+        assert "1 marker found in this picture alone" in screen_text(app)
         assert "marker 5 seen" in screen_text(app)
         trial = Trial.open(folder).changed({"detection.fill": 1.0, "detection.mode": "paper"})
         assert trial.settings.detection.fill == 1.0
