@@ -35,9 +35,10 @@ def plates(content: ReportContent, tick: Tick = silent) -> list[Plate]:
     """All figures that the content allows, in the order of the page; none is ever empty."""
     jobs = [*_space(content), *_spectra(content), *_quality(content)]
     out = []
-    for done, (section, caption, drawing) in enumerate(jobs):
-        tick(done, len(jobs), f"drawing: {section}")
-        out.append(Plate(section, drawing(), caption))
+    with figures.style():
+        for done, (section, caption, drawing) in enumerate(jobs):
+            tick(done, len(jobs), f"drawing: {section}")
+            out.append(Plate(section, drawing(), caption))
     tick(len(jobs), len(jobs), "figures drawn")
     return out
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from olivevib.report.figures.boxes import boxes
+from olivevib.report.figures.canvas import style
 from olivevib.report.figures.decays import decays
 from olivevib.report.figures.distances import Distance, distances, pair_distances
 from olivevib.report.figures.frequency import frequencies
@@ -55,6 +56,7 @@ __all__ = [
     "spectrogram",
     "spectrograms",
     "strips",
+    "style",
     "time_series",
     "total_spectra",
     "transmissibilities",
