@@ -69,15 +69,11 @@ def fit_card(
     if pixels is None:
         return None
     found = approach(draw_template(white, H, blur, layout.quiet, COARSE), pixels)
-    one = (
-        None
-        if found is None
-        else _fine(grey, white, layout, found[0], further_blur(blur, found[1]))
-    )
-    if one is not None and one.blur.variance_px2 > MOVING_PX2 and one.blur.path_px == 0:
-        one = _moving(grey, white, layout, one)
-    if one is not None and one.blur.path_px > 0 and one.noise > EVEN:
-        one = _moving(grey, white, layout, one)
+    one = None
+    if found is not None:
+        one = _fine(grey, white, layout, found[0], further_blur(blur, found[1]))
+    if one is not None:
+        one = _with_motion(grey, white, layout, one)
     if one is not None and one.noise <= EVEN:
         return one
     even = _even(grey, white, H, layout, pixels)
@@ -112,6 +108,15 @@ def _settled(fit: Fit) -> bool:
     turned = fit.to_template[:, :2] - np.eye(3)[:, :2]
     moved = fit.scale * float(np.abs(turned).max()) if fit.further.size == 3 else 0.0
     return path < REDRAWN_PATH_PX and moved < REDRAWN_SHAPE_PX
+
+
+def _with_motion(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit) -> CardFit:
+    """A motion is looked for in what is blurred, and anew where the one that was given fails."""
+    if one.blur.path_px == 0 and one.blur.variance_px2 > MOVING_PX2:
+        one = _moving(grey, white, layout, one)
+    if one.blur.path_px > 0 and one.noise > EVEN:
+        one = _moving(grey, white, layout, one)
+    return one
 
 
 def _moving(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit) -> CardFit:

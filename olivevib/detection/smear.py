@@ -30,10 +30,8 @@ def further_blur(blur: Blur, further: Floats) -> Blur:
 
 
 def motion_of(blur: Blur, further: Floats) -> Blur:
-    """A motion along the longer axis of the blur, if it is clearly longer; xx, xy, yy added."""
-    path = np.array(blur.motion_px)
-    drawn = blur.variance_px2 * np.eye(2) + np.outer(path, path) / 12
-    V = drawn + further[[0, 1, 1, 2]].reshape(2, 2)
+    """The motion in a round blur with further variances xx, xy, yy, if it is clearly longer."""
+    V = blur.variance_px2 * np.eye(2) + further[[0, 1, 1, 2]].reshape(2, 2)
     small, large = np.linalg.eigvalsh(V)
     if large - small < ELONGATED_PX2:
         return replace(blur, motion_px=(0.0, 0.0))
