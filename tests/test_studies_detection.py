@@ -55,6 +55,26 @@ def test_the_renderer_agrees_with_a_finer_one(turn):
     assert np.abs(off).max() < bound / 3
 
 
+def test_a_pixel_is_the_share_of_points_of_it_that_lie_on_white():
+    """From the definition, without the renderer's ways: points through the inverse pose."""
+    H, what = window(48, 50), ours().prints[3]
+    got = drawn(H, Look(psf_px=0.0, samples=8))
+    x, y = np.meshgrid(np.arange(75.0, 125), np.arange(75.0, 125))
+    at = (np.arange(16) + 0.5) / 16 - 0.5
+    parts = np.broadcast_arrays(x[..., None, None] + at, y[..., None, None] + at[:, None])
+    px = np.stack(parts, axis=-1)
+    u, v = apply_homography(np.linalg.inv(H), px.reshape(-1, 2)).T
+    i, j = np.floor(u + 5.5).astype(int), np.floor(v + 5.5).astype(int)
+    inside = (np.abs(u) < 5.5) & (np.abs(v) < 5.5)
+    card = (np.abs(u) < 7.5) & (np.abs(v) < 7.5)
+    assert inside.sum() > 100_000  # the marker is there
+    dark = inside & what.dark[np.clip(j, 0, 10), np.clip(i, 0, 10)]
+    want = np.where(card, np.where(dark, 40.0, 210.0), 120.0).reshape(50, 50, -1).mean(axis=2)
+    off = got[75:125, 75:125] - want
+    assert np.abs(off.mean()) < 0.05
+    assert np.sqrt((off**2).mean()) < 1.0  # of 170 levels, without any blur
+
+
 def test_bounds_of_the_knowledge_page():
     for size, tilt, bound in ((24, 0, 0.0033), (64, 60, 0.0022)):
         H = window(size, tilt)
