@@ -350,24 +350,36 @@ def _attributes(h5: Any) -> dict[str, Attribute]:
 
 
 def _variables(h5: Any) -> Iterator[tuple[str, Variable]]:
+    datasets: dict[str, Any] = {}
     for name, item in h5.items():
         if isinstance(item, h5py.Group):
-            for inner, dataset in item.items():
-                if not _is_bare(dataset):
-                    yield f"{name}/{inner}", _variable(dataset, inner)
-        elif not _is_bare(item):
-            yield name, _variable(item, name)
+            datasets |= {f"{name}/{inner}": dataset for inner, dataset in item.items()}
+        else:
+            datasets[name] = item
+    named = {_address(dataset): _last(name) for name, dataset in datasets.items()}
+    for name, dataset in datasets.items():
+        if not _is_bare(dataset):
+            yield name, _variable(dataset, named)
+
+
+def _last(name: str) -> str:
+    return name.rpartition("/")[2]
+
+
+def _address(dataset: Any) -> int:
+    """Where an object lies in its file: HDF5 finds the name of an object by a search each time."""
+    return int(h5py.h5o.get_info(dataset.id).addr)
 
 
 def _is_bare(dataset: Any) -> bool:
     return text_attribute(dataset, "NAME").startswith(NOT_A_VARIABLE)
 
 
-def _variable(dataset: Any, name: str) -> Variable:
+def _variable(dataset: Any, named: Mapping[int, str]) -> Variable:
     if dataset.is_scale:
-        dims: tuple[str, ...] = (name,)
+        dims: tuple[str, ...] = (named[_address(dataset)],)
     else:
-        dims = tuple(axis[0].name.rpartition("/")[2] for axis in dataset.dims)
+        dims = tuple(named[_address(axis[0])] for axis in dataset.dims)
     text = h5py.check_string_dtype(dataset.dtype) is not None
     values = dataset.asstr()[()] if text else dataset[()]
     if text_attribute(dataset, "dtype") == "bool":
