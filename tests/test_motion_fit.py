@@ -9,6 +9,7 @@ import pytest
 from test_motion_parts import anchor_of, scene
 
 from olivevib.reconstruction.motion import Anchor, MotionSettings, fit_motion
+from olivevib.reconstruction.motion.decide import Facts, zone
 from olivevib.reconstruction.motion.evaluate import phase_of
 from olivevib.studies import blind
 from olivevib.studies.blind_scenes import Scene, orbit, rig, sight
@@ -239,3 +240,23 @@ def test_frames_too_far_apart_for_any_knots_are_refused_in_words(monkeypatch):
     monkeypatch.setattr("olivevib.reconstruction.motion.pixels.SPACINGS_S", ())
     with pytest.raises(ValueError, match="too few for a fit"):
         fitted(scene(25.3))
+
+
+def test_an_unknown_offset_slips_by_no_period_and_hides_no_double():
+    """52 ms apart and told nothing: a nearly pure tone is not taken for half its frequency."""
+    s = scene(15.717, mm=1.0, offset_s=-0.0524, kind="steady", span_s=4.5)
+    s = replace(s, amplitude=s.amplitude * np.array([1.0, 0.1])[None, :, None])
+    anchor = replace(anchor_of(s), right_offset_s=0.0, right_offset_sigma_s=np.inf)
+    seen, fit = fitted(s, anchor=anchor)
+    assert abs(fit.f_hz - 15.717) < 5e-3
+    offset = s.offset_s + seen.reference_row * (s.readout_s[1] - s.readout_s[0]) / 720
+    assert abs(fit.timing.right_offset_s - offset) < 5 * fit.timing.sigma("right_offset_s")
+    assert not fit.timing.offset_slip
+
+
+def test_slow_motion_that_no_knots_follow_is_no_line_near_the_frame_rate():
+    _, fit = fitted(scene(25.3))
+    facts = Facts(fit.branches, 30.0, 4.0, 0.0, 0.3, 1.0, 1.0, 99.0, np.ones(3), np.zeros(3))
+    assert zone(31.64, facts) == "slow sway"
+    assert zone(33.28, facts) == ""
+    assert zone(31.64, replace(facts, offset_s=0.010)) == ""

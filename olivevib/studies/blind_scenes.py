@@ -50,6 +50,12 @@ class Scene:
         bend = wander if self.kind == "wandering" else 0.0
         return np.asarray(2 * np.pi * self.f_hz * t_s + bend)
 
+    @property
+    def mean_hz(self) -> float:
+        """The slope of the phase over the record, as a fit of it finds it."""
+        t = np.linspace(0.0, self.span_s - 1 / RATE_HZ, 400)
+        return float(np.polyfit(t, self.phase(t), 1)[0] / (2 * np.pi))
+
     def motion(self, marker: int, t_s: Floats) -> Floats:
         """Xi (..., 6) mm and rad at t_s."""
         out = np.zeros((*t_s.shape, 6))

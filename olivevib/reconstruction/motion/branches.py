@@ -73,7 +73,7 @@ def offset_starts(model: Model, f_hz: float, sigma_s: float) -> list[Floats]:
     """Thetas to start from: one, or the best offsets of a search where the anchor is weak."""
     theta = with_frequency(model, f_hz).theta0
     reach = WIDE_SIGMA * sigma_s
-    if not model.active[1] or reach < 0.17 / f_hz:
+    if not model.active[1] or not _is_wide(reach, f_hz):
         return [theta]
     count = 2 * int(np.ceil(reach * 6 * f_hz)) + 1
     offsets = theta[1] + np.linspace(-reach, reach, count)
@@ -111,8 +111,47 @@ def weigh(
         fitted.append(settle(with_frequency(model, float(b.theta[0])), b.theta))
     dropped = [b for b in first if b.evidence <= best - HOPELESS * scale]
     span = float(np.ptp(model.problems[0].zero_s))
+    if _is_wide(WIDE_SIGMA * offset_sigma_s, float(candidates_hz.max())):
+        fitted += _at_times_of_best(model, max(fitted, key=lambda b: b.evidence), candidates_hz)
     ranked = distinct(fitted + dropped, 0.5 / span)
     return prefer_double(ranked, NEAR_BEST * scale, 0.1 / span)
+
+
+def _is_wide(reach_s: float, f_hz: float) -> bool:
+    """Whether the offset may be so far off that a line's phase starts in another valley."""
+    return reach_s >= 0.17 / f_hz
+
+
+def _at_times_of_best(model: Model, best: Branch, candidates_hz: Floats) -> list[Branch]:
+    """The other candidates started at the best one's offset and row times.
+
+    Each found its own offset before; one that missed it would lose for that alone.
+    """
+    out = []
+    for f in candidates_hz:
+        start = best.theta.copy()
+        start[0] = f
+        near = with_frequency(model, float(f))
+        first = settle(near, start, 2)
+        if first.evidence > best.evidence - HOPELESS:
+            out.append(settle(with_frequency(model, float(first.theta[0])), first.theta))
+    return out
+
+
+def unslipped(model: Model, best: Branch) -> tuple[Branch, bool]:
+    """The branch at the offset that fits best among those whole periods apart.
+
+    Also whether another of them is nearly as good: then slow motion does not tell the period.
+    """
+    found = [best]
+    for k in (-2, -1, 1, 2):
+        start = best.theta.copy()
+        start[1] += k / start[0]
+        found.append(settle(with_frequency(model, float(start[0])), start))
+    found.sort(key=lambda b: -b.evidence)
+    apart = [b for b in found if abs(b.theta[1] - found[0].theta[1]) > 0.5 / best.theta[0]]
+    near = bool(apart) and found[0].evidence - apart[0].evidence < NEAR_BEST
+    return found[0], near
 
 
 def distinct(branches: list[Branch], apart_hz: float) -> list[Branch]:

@@ -25,6 +25,7 @@ STEP_S = 5e-3  # cameras nearer than this to the same instant count as in step
 NARROW_HZ = 0.3
 CHIRP_HZ_S = 0.5  # change of the apparent frequency that, left unexplained, is a chirp
 CHIRP_MISFIT = 25.0  # variance left over the localiser's that a changing speed must explain
+SWAY_HZ = 2.5  # of slow motion that no knots follow to the end: half width of its zone, at least
 SWAY_SHARE = 0.4  # over the knot spacing: half width of the sway's zone, Hz
 
 
@@ -70,7 +71,7 @@ def zone(f_hz: float, facts: Facts, harmonic: int = 1) -> str:
     rate, f = facts.rate_hz, harmonic * f_hz
     step = in_step(facts.offset_s, rate)
     narrow = max(NARROW_HZ, 1.0 / facts.span_s)
-    sway = max(narrow, SWAY_SHARE / facts.knot_s) if step else narrow
+    sway = max(narrow, SWAY_HZ, SWAY_SHARE / facts.knot_s) if step else narrow
     if round(f / rate) > 0 and abs(f - rate * round(f / rate)) < sway:
         return "slow sway"
     if not step:

@@ -21,17 +21,18 @@ from olivevib.reconstruction.motion.finish import (
     with_gain_sigma,
 )
 from olivevib.reconstruction.motion.free import fit_free
-from olivevib.reconstruction.motion.offset import with_offset
+from olivevib.reconstruction.motion.offset import WEAK_S, with_offset
 from olivevib.reconstruction.motion.pixels import Pixels, look
 from olivevib.reconstruction.motion.prepare import (
     layout,
     model_of,
     offset_sigma,
     sway_precision,
+    time_prior,
 )
 from olivevib.reconstruction.motion.problem import Pose, Whitening
 from olivevib.reconstruction.motion.sightings import Observations
-from olivevib.reconstruction.motion.solve import Branch, Model, settle, with_frequency
+from olivevib.reconstruction.motion.solve import SHARED, Branch, Model, settle, with_frequency
 from olivevib.reconstruction.motion.start import about_sway
 from olivevib.reconstruction.motion.types import (
     Anchor,
@@ -102,7 +103,20 @@ def fit_motion(
             ready = growing(ready, grown)
             weighed = br.weigh(ready.model, candidates, ready.offset_sigma_s, tick)
             model, best = refine(ready, ready.model, weighed.branches[0])
+    if clock.right_offset_sigma_s > WEAK_S:
+        best, slips = br.unslipped(with_open_offset(ready, model), best)
+        ready = replace(ready, offset_found=ready.offset_found and not slips)
+        model, best = refine(ready, model, best)
     return finished(ready, (model, best), weighed, kind, fast)
+
+
+def with_open_offset(ready: Prepared, model: Model) -> Model:
+    """The model that takes any offset of the search for equally likely."""
+    row = ready.observations.reference_row
+    loose = time_prior(ready.anchor, row, ready.settings.offset_search_s)[1]
+    precision = model.precision.copy()
+    precision[:SHARED, :SHARED] = loose
+    return replace(model, precision=precision)
 
 
 def prepare(
