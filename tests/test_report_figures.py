@@ -17,7 +17,7 @@ from olivevib.report.figures.boxes import boxes
 from olivevib.report.figures.scene import _oblique
 from olivevib.report.figures.sensor import overlay_window
 from olivevib.report.figures.spectra import noise_floor, seen_at_hz
-from olivevib.vibration import LineStatus
+from olivevib.vibration import Deflection, LineStatus, MarkerResponse, Transmission
 
 IDS = [1, 4, 17]
 NAMES = {i: f"{i}" for i in IDS}
@@ -173,3 +173,31 @@ def test_states_of_both_cameras_stand_above_space(path):
     rows = figures.strips(scene.tracks(path), path, NAMES)
     assert [label for label, _, _ in rows[:3]] == ["1 — left", "right", "3-D"]
     assert len(rows) == 3 * len(IDS)
+
+
+def response(coherence: float) -> Transmission:
+    """A flat response of marker 2 to marker 1, 1.5 on every axis."""
+    f_hz = np.linspace(1, 14, 14)
+    each = np.ones((14, 3))
+    curve = MarkerResponse(f_hz, 1.5 * each.astype(complex), coherence * each, 0.1 * each, 9)
+    return Transmission(2, 1, None, np.full(3, coherence), curve)
+
+
+def test_a_response_is_drawn_in_full_only_where_it_is_coherent():
+    sure, unsure = (figures.responses([response(c)], {1: "1", 2: "2"}) for c in (0.95, 0.3))
+    assert sure.count("<use") == unsure.count("<use") + 2 * 3 * 14  # a dot a trusted value
+    for svg in (sure, unsure):
+        ET.fromstring(svg)
+        assert "coherence" in svg and "phase" in svg and "|H1|" in svg
+    assert figures.shown_responses([response(0.9)])
+    empty = MarkerResponse(np.empty(0), np.empty((0, 3), complex), *[np.empty((0, 3))] * 2, 0)
+    assert not figures.shown_responses([replace(response(0.9), curve=empty)])
+
+
+def test_the_deflection_shape_says_how_much_it_is_enlarged(path):
+    shape = Deflection(tuple(IDS), 12.0, np.full((len(IDS), 3), 2.0 + 1.0j), "mm")
+    svg = figures.deflection(shape, path, NAMES)
+    ET.fromstring(svg)
+    factor = float(re.search(r"motion drawn ([0-9.]+) times", svg)[1])
+    extent = np.ptp(np.nanmean(path.xyz_mm, axis=0), axis=0).max()
+    assert 0.05 * extent < factor * np.linalg.norm([2, 2, 2]) < 0.2 * extent

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 
 from olivevib.arrays import Floats
 from olivevib.reconstruction.trajectory import Trajectory
@@ -96,10 +96,12 @@ def _finish(
     ax.set_xlim(0.0, float(f_hz[-1]))
     ax.set_ylim(*limits)
     x = MaxNLocator(5, prune="upper").tick_values(*ax.get_xlim())
-    locator = (
-        LogLocator(numticks=4) if logarithmic else MaxNLocator(4, steps=[1, 2, 2.5, 3, 4.5, 9])
-    )
-    canvas.light_ticks(ax, x, locator.tick_values(*limits), left=left, bottom=bottom)
+    if logarithmic:
+        y = [s * 10.0**d for d in range(-4, 5) for s in (1, 2, 5)]
+    else:
+        y = list(np.linspace(*limits, 5))
+    canvas.light_ticks(ax, x, y, left=left, bottom=bottom)
+    ax.yaxis.labelpad = 26
 
 
 def deflection(shape: Deflection, path: Trajectory, names: Mapping[int, str]) -> str:
