@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 SIDES = ("left", "right")
 PANES = ("left-board", "right-board", "in-space")
+MAP_LINES = 11  # what to show, numbers, the map of the board, the frame
 
 
 class CalibrationPage(Page):
@@ -115,7 +116,9 @@ class CalibrationPage(Page):
     def _covered(self, message: Covered) -> None:
         text = coverage_text(message.guidance, self.olive.palette)
         self.query_one("#verdict-text", Static).update(text)
-        self.query_one("#verdict").border_title = "Coverage of the board recordings"
+        pane = self.query_one("#verdict")
+        pane.border_title = "Coverage of the board recordings"
+        pane.styles.min_height = MAP_LINES
 
     def action_camera(self) -> None:
         """In a small terminal: the next of the three pictures."""

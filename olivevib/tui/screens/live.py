@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from olivevib.pipeline.capture import CaptureState
 
 
+MAP_LINES = 10  # what to show, numbers, the map, the frame
+
+
 class LivePage(Page):
     """Shows a capture; whatever happens here, what was recorded is kept."""
 
@@ -93,6 +96,8 @@ class LivePage(Page):
             return
         self.query_one("#prompt", Static).update(prompt_text(state, palette))
         self.query_one("#state", Static).update(state_text(state, palette))
+        if state.coverage is not None:  # the map of a board takes seven lines
+            self.query_one("#state-pane").styles.min_height = MAP_LINES
         for side, camera in state.cameras.items():
             pane = self.query_one(f"#{side}-live", Picture)
             pane.border_title = f"{side} camera · {camera.facts.title}"[:60].replace("[", "(")

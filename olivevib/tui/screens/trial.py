@@ -154,10 +154,10 @@ class TrialPage(Page):
         table = self.query_one("#stages", DataTable)
         self._marked = self._at_work(facts)
         for at, stage in enumerate(facts.stages):
-            reason = stage.reason
+            running = stage.name == self._marked
+            reason = "at work" if running else stage.reason
             if stage.name == "track" and facts.resume and stage.state != "done":
                 reason = f"{reason}; {facts.resume}"
-            running = stage.name == self._marked
             state = state_cell("running" if running else stage.state, self.olive.palette)
             table.update_cell_at(Coordinate(at, 1), state, update_width=True)
             table.update_cell_at(Coordinate(at, 2), plain(reason, 160), update_width=True)

@@ -62,6 +62,9 @@ def _append_prompt(out: Text, state: CaptureState, palette: Palette) -> None:
 def state_text(state: CaptureState, palette: Palette) -> Text:
     """Both cameras, a line each with its advice, and what they have in common."""
     out = Text()
+    if state.coverage is not None:  # first: who waves the board looks for it
+        out.append_text(coverage_text(state.coverage, palette))
+        out.append("\n")
     for side, camera in state.cameras.items():
         _append_camera(out, side, camera, palette)
     parts = []
@@ -71,9 +74,6 @@ def state_text(state: CaptureState, palette: Palette) -> Text:
     if math.isfinite(state.minutes_left):
         parts.append(f"{state.minutes_left:.0f} minutes left")
     out.append(" · ".join(parts), palette.muted)
-    if state.coverage is not None:
-        out.append("\n")
-        out.append_text(coverage_text(state.coverage, palette))
     return out
 
 
@@ -105,20 +105,20 @@ def camera_words(camera: CameraState) -> str:
 
 
 def coverage_text(coverage: Guidance, palette: Palette) -> Text:
-    """Where the board has been in both pictures, its tilts and distances, what is missing."""
+    """What to show next, tilts and distances, and where the board has been in both pictures."""
     out = Text()
-    maps = {side: _map_lines(seen) for side, seen in coverage.seen.items()}
-    height = max((len(lines) for lines in maps.values()), default=0)
-    for row in range(height):
-        out.append("  ".join(f"{side if row == 0 else '':>6} {maps[side][row]}" for side in maps))
-        out.append("\n")
+    out.append(f"{coverage.advice}\n", palette.good if coverage.enough else palette.accent)
     still = f", never its {', '.join(coverage.still)} side nearer" if coverage.still else ""
     numbers = (
         f"{coverage.pairs} views in both cameras · {coverage.tilts} of 4 tilts{still} · "
         f"farthest {coverage.far_to_near:.1f} × nearest"
     )
     out.append(f"{numbers}\n", palette.muted)
-    out.append(coverage.advice, palette.good if coverage.enough else palette.accent)
+    maps = {side: _map_lines(seen) for side, seen in coverage.seen.items()}
+    height = max((len(lines) for lines in maps.values()), default=0)
+    for row in range(height):
+        out.append("  ".join(f"{side if row == 0 else '':>6} {maps[side][row]}" for side in maps))
+        out.append("\n" if row < height - 1 else "")
     return out
 
 
