@@ -149,8 +149,8 @@ def board_lines(told: Guidance, state: CaptureState | None = None) -> list[str]:
     lines += ["  " + "  ".join(row) for row in zip(*maps, strict=True)]
     shares = "  ".join(f"{f'{share:.0%} covered':<{width}}" for share in told.cells.values())
     lines.append(f"  {shares}")
-    lines.append(f"  {told.measures}")
+    lines += [f"  {part}" for part in told.measures.split(" · ")]
     lines.append(f"  {told.words.upper() if told.enough else 'NEXT: ' + told.words}")
     if told.forecast is not None:
-        lines.append(f"  {told.forecast.words}")
+        lines += [f"  {part}" for part in told.forecast.words.split("; ")]
     return lines
