@@ -108,6 +108,28 @@ def test_a_steady_record_leaves_the_lag_open_but_not_the_gain():
     assert c.gain == pytest.approx(1.0, abs=0.01)
 
 
+def test_what_is_left_must_be_noise_before_chi_square_excludes_a_lag(monkeypatch):
+    """A marker that also moves by itself: chi-square says nothing then, the lag stays open."""
+    rng = np.random.default_rng(21)
+    t = np.arange(-2, 9, 1 / 4000)
+    turn = 2 * np.pi * 25 * t
+    beat = 4 + 0.7 * np.sin(2 * np.pi * np.outer(t, [3.1, 4.7, 6.1])).sum(axis=1)
+    path = beat[:, None] * np.stack([np.cos(turn), 0.5 * np.sin(turn), 0 * t], axis=1)
+    optical = camera(t, path, rng, np.arange(0, 7, 1 / 30), 0.06, EXPOSURE)
+    own = 1.0 * np.sin(2 * np.pi * 8.3 * optical.t_s)[:, None] * np.array([0.3, 1.0, 0.4])
+    optical = displacement(optical.t_s, optical.values + own)
+    accelerometer = sensor(t, path, rng, Logger(), rotation(rng))
+    c = compare(optical, accelerometer, 1, "trunk", SETTINGS)
+    assert c.peak - c.second_peak < 0.05
+    assert 0.6 < c.coherence < 0.95
+    assert c.ambiguous
+    assert c.verdict is Verdict.UNDECIDED
+    monkeypatch.setattr("olivevib.comparison.rival._NOISE_ONLY", 0.0)
+    without = compare(optical, accelerometer, 1, "trunk", SETTINGS)
+    assert not without.ambiguous  # the guard keeps it open, rightly: this lag is another
+    assert abs(without.clock_offset_s - LOGGER.offset_s) > 0.1
+
+
 def fitted_at_one_frequency(seed):
     """A path as the fit in continuous time gives it (steady phase only), and both cameras' rows."""
     shaker, logger = Shaker(harmonic=0.0), Logger(offset_s=3.7)
