@@ -10,6 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from olivevib.report.clean import clean
+from olivevib.report.content import ReportContent
+from olivevib.report.lines import candidates_text
+from olivevib.report.verdict import verdict
 from olivevib.report.words import count, fact, label, measure, number, percent, seconds, triple
 
 
@@ -100,3 +103,22 @@ def test_clean_keeps_languages_and_cuts_the_rest():
     assert clean("a\x1b[31mb\u202ec\r\n\td") == "a[31mbc d"
     assert clean("x" * 5000).endswith("…")
     assert len(clean("e" + "\u0301" * 500)) == 3
+
+
+def test_what_failed_is_said_in_the_first_sentence():
+    stages = {"calibrate": {"state": "done"}, "track": {"state": "failed", "reason": "no stamps"},
+              "reconstruct": {"state": "blocked", "reason": "track has failed"}}  # fmt: skip
+    told = verdict(ReportContent("T1", summary={"stages": stages}))
+    assert told[0].startswith("Mind this first: track failed (no stamps); reconstruct could not")
+    assert "no warning was raised" not in told[-1]
+    sound = verdict(ReportContent("T1", summary={"stages": {"track": {"state": "done"}}}))
+    assert len(sound) == 3
+    assert "no warning was raised" in sound[-1]
+
+
+def test_candidates_carry_their_probabilities_where_they_are_known():
+    assert (
+        candidates_text((5.0, 25.0), (0.12, 0.88))
+        == "5.00 (12\u00a0%) or 25.00 (88\u00a0%)\u00a0Hz"
+    )
+    assert candidates_text((5.0, 25.0)) == "5.00 or 25.00\u00a0Hz"
