@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 
 from olivevib.files.store import StageFile, Variable
-from olivevib.reconstruction.motion.types import TIMING, Anchor, BranchTable, MarkerMotion, MotionFit, Timing
+from olivevib.reconstruction.motion.types import (
+    TIMING,
+    Anchor,
+    BranchTable,
+    MarkerMotion,
+    MotionFit,
+    Timing,
+)
 from olivevib.vibration import LineStatus
 
 GROUP = "fit"
