@@ -99,7 +99,7 @@ def test_the_board_is_guided_recorded_whole_and_can_be_calibrated(
     out, told = capsys.readouterr()
     assert code == 0, told
     assert "ENOUGH NOW" in out and "NEXT" not in out
-    assert "██" in out and "side nearer to the cameras" in out
+    assert "██" in out and "nearer side: " in out
     assert int(re.search(r"(\d+) of 6 views", out)[1]) >= 6
     assert "show the board" in told  # was said while it was not enough
     assert "Next: olivevib calibrate T" in told

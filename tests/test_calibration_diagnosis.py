@@ -111,7 +111,7 @@ def test_what_is_proposed_for_a_chessboard_is_found_then(declared):
     assert causes in (["wrong-counts", "sound"], ["wrong-kind", "sound"])
 
 
-@pytest.mark.parametrize("declared", [CHESS, "chessboard:6x8,square=40"])
+@pytest.mark.parametrize("declared", [CHESS, "chessboard:5x7,square=40"])
 def test_a_chessboard_that_is_never_whole_asks_for_another_recording_not_another_board(
     declared, monkeypatch
 ):

@@ -54,7 +54,7 @@ class Guidance:
         """How many views, tilts and distances there are, of how many, in words."""
         sides = [f"{side} {'yes' if side not in self.still else '--'}" for side in TILTS]
         return (
-            f"{self.pairs} of {LEAST_PAIRS} views · side nearer to the cameras: {', '.join(sides)} "
+            f"{self.pairs} of {LEAST_PAIRS} views · nearer side: {', '.join(sides)} "
             f"({self.tilts} of {LEAST_TILTS}) · farthest {self.far_to_near:.1f} times nearest "
             f"(of {LEAST_DEPTH:g})"
         )

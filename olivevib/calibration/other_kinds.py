@@ -86,13 +86,16 @@ def plain_squares(
     columns, rows = most if board.columns >= board.rows else most[::-1]
     works = Board("chessboard", columns, rows, {"square": board.lengths_mm["square"]})
     declared = {board.columns, board.rows} == set(most) and board.kind == "chessboard"
-    if declared or not enough(len(views_of(works, frames, as_is, None)), frames):
+    measured = enough(len(views_of(works, frames, as_is, None)), frames)
+    if not declared and not measured:  # texture may look like a few corners
+        return None
+    if declared:
         return Diagnosis(
             "unsteady",
-            f"A chessboard of {columns}x{rows} inner corners shows in {count} of {len(frames)} "
-            f"frames{', as declared' if declared else ''}, but never whole and sharp enough.",
+            f"A chessboard of {columns}x{rows} inner corners, as declared, shows in {count} of "
+            f"{len(frames)} frames, but never whole and sharp enough to be measured.",
             STEADY,
-            works if declared else None,
+            board,
             tuple(attempts),
         )
     if board.kind == "charuco":
