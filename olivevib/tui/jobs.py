@@ -95,8 +95,8 @@ def make_export(folder: Path, to: str) -> Work:
         trial = Trial.open(folder)
         target = pipeline.export_place(trial, to)
         tick(0, 1, f"writing {to}")
-        pipeline.export(trial, to, target)
-        return Result(f"The export is {harmless(target)}")
+        cautions = pipeline.export(trial, to, target)
+        return Result(f"The export is {harmless(target)}", tuple(cautions))
 
     return Work(f"{_name(folder)}: export {to}", do)
 
