@@ -15,6 +15,7 @@ from rich.cells import cell_len
 from small_videos import make_video
 
 from olivevib.errors import InputError, UsageError
+from olivevib.pipeline import SensorPlan
 from olivevib.progress import Cancelled
 from olivevib.trial.quality import StageLine
 from olivevib.tui.app import OlivevibApp
@@ -22,7 +23,7 @@ from olivevib.tui.harmless import REPLACEMENT, harmless, plain
 from olivevib.tui.kept import Kept, place_of, read_kept, write_kept
 from olivevib.tui.loader import TrialRow
 from olivevib.tui.look import look_at
-from olivevib.tui.plan import FIELDS, guesses, plan_of, trial_name
+from olivevib.tui.plan import form_fields, guesses, plan_of, trial_name
 from olivevib.tui.screens.error import error_text
 from olivevib.tui.themes import palette_of
 from olivevib.tui.views.palette import Palette
@@ -212,7 +213,10 @@ def test_the_form_becomes_a_plan():
     plan = plan_of(
         {
             "left": "a.mkv", "right": "b.mkv", "size": "60", "ids": "1,2,5-7", "band": "5-45",
-            "row_time": "27.8,-27.8", "shutter": "rolling", "accelerometer_marker": "3",
+            "row_time": "27.8,-27.8", "shutter": "rolling",
+            "accelerometer": "a.csv", "accelerometer_marker": "3",
+            "accelerometer2": "b.csv", "accelerometer2_axes": "x,-z,y",
+            "accelerometer2_lever": "0,25,-8",
             "link": "yes", "board": "coded:5x5,pitch=60,size=44",
         }
     )  # fmt: skip
@@ -220,7 +224,8 @@ def test_the_form_becomes_a_plan():
     assert plan.ids == (1, 2, 5, 6, 7)
     assert plan.band_hz == (5.0, 45.0)
     assert plan.row_time_us == (27.8, -27.8)
-    assert plan.accelerometer_marker == 3
+    second = SensorPlan("b.csv", None, ("x", "-z", "y"), (0.0, 25.0, -8.0))
+    assert plan.every_sensor == (SensorPlan("a.csv", 3), second)
     assert plan.link
     assert plan.markers == "olive49"
     assert plan.rig is None
@@ -242,7 +247,12 @@ def test_the_form_becomes_a_plan():
         ("board", "coded:", "“board”"),
         ("markers", "aruco:NONE", "“marker library”"),
         ("calibration_left", "stills", "“right board”: only one side"),
-        ("accelerometer_marker", "1.5", "“its marker”: '1.5' is no id"),
+        ("accelerometer_marker", "1.5", "“its marker”: '1.5' cannot be read"),
+        ("accelerometer_axes", "x,y", "“its axes”: 'x,y' cannot be read"),
+        ("accelerometer_axes", "x,y", "Give them as x,-z,y"),
+        ("accelerometer_lever", "25", "“its lever, mm”: '25' cannot be read"),
+        ("accelerometer2_marker", "3", "“accelerometer 2”: the file of this accelerometer is not"),
+        ("accelerometer2", "gone.csv", "“accelerometer 2”: gone.csv is missing"),
         ("accelerometer_marker", "900", "“its marker”: the accelerometer's marker 900 is none"),
     ],
 )
@@ -257,7 +267,11 @@ def test_a_fault_names_its_line_in_the_words_of_the_form(field, text, words, tmp
     assert words in str(looked.error)
     assert "--" not in str(looked.error)
     assert "trial.toml" not in str(looked.error)
-    assert looked.field == ("calibration_right" if field == "calibration_left" else field)
+    elsewhere = {
+        "calibration_left": "calibration_right",
+        "accelerometer2_marker": "accelerometer2",
+    }
+    assert looked.field == elsewhere.get(field, field)
 
 
 @pytest.mark.parametrize("name", ["", "  ", "..", "a/b", "a\\b", "a:b"])
@@ -280,7 +294,7 @@ def test_one_side_tells_the_other_and_what_lies_beside(tmp_path):
     }
     assert "right" not in guesses("left", tmp_path / "left.mkv", {"right": "mine.mkv"})
     assert guesses("rig", tmp_path / "left.mkv", {}) == {}
-    assert {f.name for f in FIELDS} >= set(found)
+    assert {f.name for f in form_fields(1)} >= set(found)
 
 
 # -- settings -------------------------------------------------------------------------------------

@@ -26,10 +26,14 @@ MANY_IDS = 100  # of a foreign dictionary: so many that chance finds some of the
 
 
 class Fault(NamedTuple):
-    """What is wrong, and the field of the plan (``NewTrial``) that it is about."""
+    """What is wrong, and the field of the plan (``NewTrial``) that it is about.
+
+    sensor: which of the plan's sensors, from 1; 1 where it is about none.
+    """
 
     field: str
     error: OlivevibError
+    sensor: int = 1
 
 
 def check_plan(plan: NewTrial) -> None:
@@ -131,7 +135,7 @@ def _said(plan: NewTrial) -> Iterator[Fault]:
 
 def _sensor_marker(plan: NewTrial, library: MarkerLibrary) -> Iterator[Fault]:
     ids = plan.ids or tuple(int(i) for i in library.ids)
-    for sensor in plan.every_sensor:
+    for number, sensor in enumerate(plan.every_sensor, start=1):
         if sensor.marker is None or sensor.marker in ids:
             continue
         error = UsageError(
@@ -139,15 +143,17 @@ def _sensor_marker(plan: NewTrial, library: MarkerLibrary) -> Iterator[Fault]:
             "The two can only be compared where the camera sees the sensor's marker.",
             "Correct --accelerometer-marker ID, or add it to --ids.",
         )
-        yield Fault("accelerometer_marker", error)
+        yield Fault("accelerometer_marker", error, number)
 
 
 def _missing(plan: NewTrial) -> Iterator[Fault]:
     fields = ("left", "right", "calibration_left", "calibration_right", "rig", "preset")
-    named = [(field, getattr(plan, field)) for field in fields]
-    for field, name in [*named, *(("accelerometer", s.file) for s in plan.every_sensor)]:
+    named = [(field, getattr(plan, field), 1) for field in fields]
+    sensors = enumerate(plan.every_sensor, start=1)
+    for field, name, sensor in [*named, *(("accelerometer", s.file, k) for k, s in sensors)]:
         if name and not Path(name).exists():
-            yield Fault(field, InputError(f"{name} is missing.", "", "Check the name and folder."))
+            error = InputError(f"{name} is missing.", "", "Check the name and folder.")
+            yield Fault(field, error, sensor)
 
 
 def _files(plan: NewTrial, gone: set[str]) -> Iterator[Fault]:
@@ -172,8 +178,9 @@ def _files(plan: NewTrial, gone: set[str]) -> Iterator[Fault]:
     if plan.rig and "rig" not in gone:
         yield from _tried("rig", lambda: _rig_size(str(plan.rig), sizes))
     if not gone & {"accelerometer", "preset"}:
-        for sensor in plan.every_sensor:
-            yield from _tried("accelerometer", partial(_sensor, sensor.file, plan.preset))
+        for number, sensor in enumerate(plan.every_sensor, start=1):
+            look = partial(_sensor, sensor.file, plan.preset)
+            yield from (f._replace(sensor=number) for f in _tried("accelerometer", look))
 
 
 def _tried(field: str, look: Callable[[], object]) -> Iterator[Fault]:

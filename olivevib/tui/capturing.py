@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from olivevib.errors import Caution, OlivevibError, UsageError
 from olivevib.progress import Cancelled, Tick
-from olivevib.tui.plan import BANDS, BOARDS, IDS, LIBRARIES, SIZES, Field, number_in, trial_name
+from olivevib.tui.fields import Field, number_in
+from olivevib.tui.plan import BANDS, BOARDS, IDS, LIBRARIES, SIZES, trial_name
 from olivevib.tui.work import Result, Work
 
 if TYPE_CHECKING:

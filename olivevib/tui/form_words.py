@@ -6,13 +6,16 @@ import re
 from collections.abc import Sequence
 
 from olivevib.errors import OlivevibError, UsageError
-from olivevib.tui.plan import FORM_NAMES, Field
+from olivevib.tui.fields import Field
+from olivevib.tui.plan import FORM_NAMES
+from olivevib.tui.sensors import PARTS, sensor_line, sensor_of
 
 _UNITS = r"(?: (?:FILE|PATH|SPEC|MM|US|MS|LIB|ID|DEVICE|NAME|HZ|\d[\d.,-]*(?=[):;])))?"
 _OPTION = re.compile(rf"--([a-z][a-z-]*){_UNITS}")
 _PLAIN = (
     (re.compile(r"; olivevib \w+ --help lists them"), "; Ctrl+O in that line lists them"),
     (re.compile(r" \([a-z_]+\.[a-z_]+ in trial\.toml\)"), ""),
+    (re.compile(r"--[a-z-]+="), ""),
     (re.compile(r" \(olivevib \w+[^)]*\)"), ""),
 )
 
@@ -25,6 +28,8 @@ def in_form_words(
     field: the line that it is about, where that is known.
     """
     labels = {f.name: f.label for f in fields}
+    if number := sensor_of(field or ""):  # its options name the lines of this sensor
+        labels |= {sensor_line(1, part): labels[sensor_line(number, part)] for part in PARTS}
     parts = [_plain(part, labels) for part in (error.what, error.why, error.remedy)]
     label = labels.get(field or "")
     if label and f"“{label}”" not in parts[0]:

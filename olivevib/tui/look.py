@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from olivevib.errors import OlivevibError
+from olivevib.tui.fields import FieldError
 from olivevib.tui.form_words import in_form_words, unsaid_words
 from olivevib.tui.loader import guarded
-from olivevib.tui.plan import FIELDS, FORM_NAMES, FieldError, plan_of, trial_name
+from olivevib.tui.plan import FORM_NAMES, fields_of, plan_of, trial_name
+from olivevib.tui.sensors import line_told
 
 if TYPE_CHECKING:
     from olivevib.pipeline import NewTrial
@@ -32,17 +34,18 @@ def look_at(values: Mapping[str, str], whole: bool = False) -> Look:
     """
     from olivevib import pipeline
 
+    lines = fields_of(values)
     told = guarded(lambda: _told(values, whole))
     if isinstance(told, OlivevibError):
         field = told.field if isinstance(told, FieldError) else ""
-        return Look(None, in_form_words(told, FIELDS, field), field)
+        return Look(None, in_form_words(told, lines, field), field)
     found = guarded(lambda: next(pipeline.faults(told), None))
     if isinstance(found, OlivevibError):
         return Look(None, found)
     if found is not None:
-        field = FORM_NAMES.get(found.field, found.field)
-        return Look(None, in_form_words(found.error, FIELDS, field), field)
-    return Look(told, unsaid=unsaid_words(pipeline.unsaid(told), FIELDS))
+        field = FORM_NAMES.get(found.field, line_told(found.field, found.sensor, values))
+        return Look(None, in_form_words(found.error, lines, field), field)
+    return Look(told, unsaid=unsaid_words(pipeline.unsaid(told), lines))
 
 
 def _told(values: Mapping[str, str], whole: bool) -> NewTrial:

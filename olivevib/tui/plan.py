@@ -3,33 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
-from olivevib.errors import UsageError
+from olivevib.tui.fields import Field, FieldError, number_in, read_field
+from olivevib.tui.sensors import how_many, sensor_fields, sensors_in
 
 if TYPE_CHECKING:
     from olivevib.pipeline import NewTrial
     from olivevib.trial import TrialSettings
     from olivevib.trial.settings import Markers
-
-Value = TypeVar("Value")
-
-
-@dataclass(frozen=True)
-class Field:
-    """One line of the form; ``path``: it names a file or folder that can be picked.
-
-    choices: what is offered beside what trials of this workspace said before.
-    """
-
-    name: str
-    label: str
-    hint: str
-    path: bool = False
-    choices: tuple[str, ...] = ()
-
 
 BOARDS = (
     "coded:5x5,pitch=60,size=44",
@@ -44,7 +27,7 @@ IDS = ("1-6", "1-8", "1-12", "1-24")
 EXPOSURES = ("1", "2", "5", "10")
 BANDS = ("5-14", "5-25", "5-45", "15-40")
 
-FIELDS = (
+BEFORE_SENSORS = (
     Field("trial", "trial", "its name, e.g. 2026-11-20_T04"),
     Field("left", "left recording", "video of the left camera", True),
     Field("right", "right recording", "video of the right camera", True),
@@ -59,9 +42,9 @@ FIELDS = (
     Field("row_time", "row time, µs", "27.8 or 27.8,-27.8; empty: unknown"),
     Field("exposure", "exposure, ms", "2; empty: unknown, blur stays", choices=EXPOSURES),
     Field("band", "band, Hz", "where the shaker's frequency may lie: 5-45", choices=BANDS),
-    Field("accelerometer", "accelerometer", "what the logger wrote", True),
-    Field("accelerometer_marker", "its marker", "the id it was fixed to"),
-    Field("preset", "its preset", "how its file is read: kept from another trial", True),
+)
+AFTER_SENSORS = (
+    Field("preset", "sensor preset", "how the file is read: kept from another trial", True),
     Field("left_stamps", "left stamps", "time stamps, where they are in a file", True),
     Field("right_stamps", "right stamps", "time stamps, where they are in a file", True),
     Field("link", "link", "yes: leave the recordings in place; empty: copy", choices=("yes",)),
@@ -86,15 +69,17 @@ SHARED = ("place", "operator", "cultivar", "machine")  # of the record: as on th
 FORM_NAMES = {"size_mm": "size", "row_time_us": "row_time", "band_hz": "band"} | {
     "exposure_ms": "exposure"
 }  # what the plan calls a line of the form
-PATHS = tuple(field.name for field in FIELDS if field.path)
 
 
-class FieldError(UsageError):
-    """A line of a form that cannot be read; ``field`` is its name."""
+def form_fields(sensors: int) -> tuple[Field, ...]:
+    """Every line of the form with room for so many accelerometers."""
+    lines = (line for number in range(1, sensors + 1) for line in sensor_fields(number))
+    return (*BEFORE_SENSORS, *lines, *AFTER_SENSORS)
 
-    def __init__(self, field: str, what: str, remedy: str) -> None:
-        super().__init__(what, "", remedy)
-        self.field = field
+
+def fields_of(values: Mapping[str, str]) -> tuple[Field, ...]:
+    """The lines of the form that these values are of."""
+    return form_fields(how_many(values))
 
 
 def plan_of(values: Mapping[str, str]) -> NewTrial:
@@ -107,8 +92,8 @@ def plan_of(values: Mapping[str, str]) -> NewTrial:
     from olivevib.trial.workspace import find_preset
 
     said = {name: text.strip() for name, text in values.items() if text.strip()}
-    size, own_sizes = _read(said, "size", typed.sizes) or (None, {})
-    left_row, right_row = _read(said, "row_time", typed.row_times) or (None, None)
+    size, own_sizes = read_field(said, "size", typed.sizes) or (None, {})
+    left_row, right_row = read_field(said, "row_time", typed.row_times) or (None, None)
     return NewTrial(
         left=said.get("left", ""),
         right=said.get("right", ""),
@@ -119,25 +104,17 @@ def plan_of(values: Mapping[str, str]) -> NewTrial:
         markers=said.get("markers", "olive49"),
         size_mm=size,
         sizes_mm=own_sizes,
-        ids=_read(said, "ids", typed.id_list) or (),
+        ids=read_field(said, "ids", typed.id_list) or (),
         shutter=_shutter(said),
         row_time_us=(left_row, right_row),
-        band_hz=_read(said, "band", typed.band),
+        band_hz=read_field(said, "band", typed.band),
         exposure_ms=number_in(said, "exposure"),
         left_stamps=said.get("left_stamps"),
         right_stamps=said.get("right_stamps"),
-        accelerometer=said.get("accelerometer"),
-        accelerometer_marker=_whole(said, "accelerometer_marker"),
+        sensors=sensors_in(said),
         preset=find_preset(said["preset"], Path()) if "preset" in said else None,
         link=said.get("link", "no").lower() in ("yes", "y", "true", "1"),
     )
-
-
-def _read(said: Mapping[str, str], name: str, how: Callable[[str | None], Value]) -> Value | None:
-    try:
-        return how(said.get(name))
-    except UsageError as error:
-        raise FieldError(name, f"{said[name]!r} cannot be read.", error.remedy) from error
 
 
 def record_of(values: Mapping[str, str]) -> dict[str, object]:
@@ -195,23 +172,6 @@ def trial_name(values: Mapping[str, str]) -> str:
         what = f"{name!r} is no name of a trial: it becomes a folder."
         raise FieldError("trial", what, "Write e.g. 2026-11-20_T04.")
     return name
-
-
-def number_in(said: Mapping[str, str], name: str) -> float | None:
-    """The number in a field; None where it is empty, FieldError where it is none."""
-    if name not in said:
-        return None
-    try:
-        return float(said[name].replace(",", "."))
-    except ValueError:
-        raise FieldError(name, f"{said[name]!r} is no number.", "Write e.g. 60.") from None
-
-
-def _whole(said: Mapping[str, str], name: str) -> int | None:
-    number = number_in(said, name)
-    if number is not None and number != int(number):
-        raise FieldError(name, f"{said[name]!r} is no id.", "Write the marker's number, e.g. 3.")
-    return None if number is None else int(number)
 
 
 def _shutter(said: Mapping[str, str]) -> str | None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from olivevib.errors import UsageError
-from olivevib.tui.plan import BANDS, EXPOSURES, SIZES, Field, FieldError, number_in
+from olivevib.tui.fields import Field, FieldError, number_in
+from olivevib.tui.plan import BANDS, EXPOSURES, SIZES
 
 FIELDS = (
     Field("fps", "frames/s", "30", choices=("30", "60", "120")),

@@ -12,9 +12,10 @@ from textual.widgets import Button, Input, Static
 
 from olivevib.errors import OlivevibError
 from olivevib.tui.capturing import FIELDS, REHEARSAL, Recording, told_of
+from olivevib.tui.fields import FieldError
 from olivevib.tui.form_words import in_form_words
 from olivevib.tui.loader import CameraLine, camera_lines, guarded
-from olivevib.tui.plan import FieldError, free_name
+from olivevib.tui.plan import free_name
 from olivevib.tui.screens.form_page import FormPage
 from olivevib.tui.screens.page import Help, Jump
 from olivevib.tui.views.cameras import cameras_text

@@ -11,7 +11,7 @@ from textual import on
 from textual.binding import Binding, BindingType
 from textual.widgets import Button, Input
 
-from olivevib.tui.plan import Field
+from olivevib.tui.fields import Field
 from olivevib.tui.screens.choose import ChooseScreen
 from olivevib.tui.screens.page import Page
 from olivevib.tui.screens.pick import PickScreen
@@ -25,9 +25,14 @@ class FormPage(Page):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("ctrl+o", "pick", "Pick, choose")]
 
     @property
+    def fields(self) -> Sequence[Field]:
+        """The lines of the form as it stands."""
+        return self.FIELDS
+
+    @property
     def values(self) -> dict[str, str]:
         """What has been typed."""
-        return form_values_of(self, self.FIELDS)
+        return form_values_of(self, self.fields)
 
     def changed(self, name: str) -> None:
         """A line was left, entered or chosen."""
@@ -47,7 +52,7 @@ class FormPage(Page):
 
     def pick(self, name: str) -> None:
         """Show what is offered for a line of the form."""
-        field = next((f for f in self.FIELDS if f.name == name), None)
+        field = next((f for f in self.fields if f.name == name), None)
         if field is None:
             return
         taken = partial(self._taken, field)

@@ -11,21 +11,22 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, VerticalScroll
 from textual.message import Message
-from textual.widgets import Button, Input, Static
+from textual.widgets import Button, Input, Label, Static
 from textual.worker import get_current_worker
 
 from olivevib.arrays import Grey
 from olivevib.errors import OlivevibError
 from olivevib.tui import jobs
+from olivevib.tui.fields import Field
 from olivevib.tui.form_words import sentence_of
 from olivevib.tui.frames import first_frame
 from olivevib.tui.harmless import harmless
 from olivevib.tui.loader import FormValues, form_values, guarded
 from olivevib.tui.look import Look, look_at
 from olivevib.tui.plan import (
-    FIELDS,
-    PATHS,
-    Field,
+    AFTER_SENSORS,
+    BEFORE_SENSORS,
+    form_fields,
     free_name,
     guesses,
     record_of,
@@ -33,6 +34,7 @@ from olivevib.tui.plan import (
 )
 from olivevib.tui.screens.form_page import FormPage
 from olivevib.tui.screens.page import Help, Jump
+from olivevib.tui.sensors import PARTS, sensor_fields, sensor_line, sensor_of
 from olivevib.tui.views.picture import Window
 from olivevib.tui.widgets.form import form_rows
 from olivevib.tui.widgets.picture import Picture
@@ -44,14 +46,14 @@ class NewTrialPage(FormPage):
     """The form of ``olivevib new``."""
 
     NAME = "new trial"
-    FIELDS = FIELDS
     HELP_TEXT = Help(
         "Two recordings, and either two recordings of the calibration board with its description "
         "or the rig of an earlier calibration. Naming the left side fills in what lies beside it; "
         "what was said of the last trial stands there already. Ctrl+O, or the button beside a "
         "line, picks a file or chooses a value. What is wrong with a line is told below when you "
         "leave it. Everything is checked before anything is made; recordings are copied, never "
-        "moved.",
+        "moved. F2 makes room for one more accelerometer, F3 takes one out again; each is compared "
+        "with its own marker, where it sat on it.",
         "Give the marker size, the ids on the tree, the shutter, the exposure and the band: "
         "without them a frequency may stay undecided and amplitudes keep the blur. All of it can "
         "be changed later (s on the trial).",
@@ -59,6 +61,8 @@ class NewTrialPage(FormPage):
     JUMPS = (Jump("f", "#form"),)
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("ctrl+s", "make", "Make the trial"),
+        Binding("f2", "add_sensor", "Add accelerometer"),
+        Binding("f3", "drop_sensor", "Take an accelerometer out", show=False),
     ]
 
     class FrameRead(Message):
@@ -86,6 +90,7 @@ class NewTrialPage(FormPage):
         super().__init__(workspace)
         self._like = like
         self._filled = False
+        self._sensors = 1
         self._used: Mapping[str, tuple[str, ...]] = {}
 
     def read(self) -> FormValues:
@@ -112,9 +117,20 @@ class NewTrialPage(FormPage):
             yield Picture(id="right-first", title="right, first frame")
         with VerticalScroll(id="form", classes="pane", can_focus=False) as form:
             form.border_title = "New trial"
-            yield from form_rows(FIELDS)
+            yield from form_rows((*BEFORE_SENSORS, *sensor_fields(1)))
+            yield from self._sensor_buttons()
+            yield from form_rows(AFTER_SENSORS)
             yield Button("Make the trial", id="make", variant="primary")
         yield Static(id="told", markup=False)
+
+    def _sensor_buttons(self) -> ComposeResult:
+        """For the mouse, below the lines of the last accelerometer."""
+        with Horizontal(id="sensor-buttons"):
+            yield Label("")
+            for action, words in (("add_sensor", "+ one more  F2"), ("drop_sensor", "− out  F3")):
+                button = Button(words, id=action, compact=True)
+                button.can_focus = False
+                yield button
 
     def on_mount(self) -> None:
         """Start at the name."""
@@ -132,13 +148,15 @@ class NewTrialPage(FormPage):
 
     def start_folder(self) -> Path:
         """Beside what was named, else where a file was last picked, else here."""
-        named = [Path(self.values[p]).parent for p in PATHS if self.values[p]]
+        values = self.values
+        named = [Path(values[f.name]).parent for f in self.fields if f.path and values[f.name]]
         return named[0] if named and named[0].is_dir() else super().start_folder()
 
     def changed(self, name: str) -> None:
         """A path was named: fill in its neighbours, show first frames; look at the whole form."""
         text = self.values.get(name, "").strip()
-        if name in PATHS and text and Path(text).exists():
+        is_path = any(f.path for f in self.fields if f.name == name)
+        if is_path and text and Path(text).exists():
             for other, found in guesses(name, Path(text), self.values).items():
                 self.query_one(f"#{other}", Input).value = found
             for side in SHOWN:
@@ -161,6 +179,38 @@ class NewTrialPage(FormPage):
             height, width = frame.shape
             pane.show(frame, Window(0, 0, width, height), ())
             pane.border_title = f"{message.side}, {width} × {height} px"
+
+    # -- accelerometers ---------------------------------------------------------------------------
+
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """The lines, with those of every accelerometer."""
+        return form_fields(self._sensors)
+
+    async def action_add_sensor(self) -> None:
+        """Four more lines, for another accelerometer."""
+        number = self._sensors + 1
+        rows = form_rows(sensor_fields(number))
+        await self.query_one("#form").mount_all(rows, before="#sensor-buttons")
+        self._sensors = number
+        self.query_one(f"#{sensor_line(number)}").focus()
+
+    async def action_drop_sensor(self) -> None:
+        """Take out the accelerometer with the cursor, else the last; the first is only emptied."""
+        here = sensor_of((self.focused.id or "") if self.focused else "") or self._sensors
+        for number in range(here, self._sensors + 1):
+            for part in PARTS:
+                later = self.query(f"#{sensor_line(number + 1, part)}").results(Input)
+                line = self.query_one(f"#{sensor_line(number, part)}", Input)
+                line.value = next((other.value for other in later), "")
+        self.query_one(f"#{sensor_line(min(here, max(1, self._sensors - 1)))}").focus()
+        if self._sensors > 1:
+            last, self._sensors = self._sensors, self._sensors - 1
+            for part in PARTS:
+                row = self.query_one(f"#{sensor_line(last, part)}").parent
+                if isinstance(row, Horizontal):
+                    await row.remove()
+        self._look()
 
     # -- looking and making -----------------------------------------------------------------------
 

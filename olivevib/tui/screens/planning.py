@@ -13,9 +13,9 @@ from textual.widgets import Input, Static
 from textual.worker import get_current_worker
 
 from olivevib.errors import OlivevibError
+from olivevib.tui.fields import FieldError
 from olivevib.tui.form_words import in_form_words
 from olivevib.tui.loader import guarded
-from olivevib.tui.plan import FieldError
 from olivevib.tui.planned import FIELDS, USUAL, planned_words
 from olivevib.tui.screens.form_page import FormPage
 from olivevib.tui.screens.page import Help, Jump

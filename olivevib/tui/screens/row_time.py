@@ -15,10 +15,10 @@ from textual.widgets import Button, Input, Static
 
 from olivevib.errors import OlivevibError
 from olivevib.tui import tool_jobs
+from olivevib.tui.fields import Field, FieldError, number_in
 from olivevib.tui.form_words import in_form_words
 from olivevib.tui.harmless import harmless
 from olivevib.tui.loader import book_lines, guarded
-from olivevib.tui.plan import Field, FieldError, number_in
 from olivevib.tui.screens.form_page import FormPage
 from olivevib.tui.screens.page import Help, Jump
 from olivevib.tui.widgets.form import form_rows

@@ -8,7 +8,7 @@ from textual.containers import Horizontal
 from textual.widget import Widget
 from textual.widgets import Button, Input, Label
 
-from olivevib.tui.plan import Field
+from olivevib.tui.fields import Field
 
 
 def form_rows(fields: Iterable[Field]) -> Iterator[Widget]:
