@@ -92,7 +92,7 @@ def test_markers_are_chosen_by_id_and_unknown_ids_are_named() -> None:
     trajectory = make_trajectory()
     frame = pd.read_csv(io.BytesIO(exported(trajectory, "csv", ids=(31, 2))))
     assert frame["marker"].unique().tolist() == [2, 31]
-    with pytest.raises(UsageError, match=r"--markers: 5 .*\n.*2, 7, 31"):
+    with pytest.raises(UsageError, match=r"no marker 5.*\n.*2, 7, 31"):
         exported(trajectory, "csv", ids=(2, 5))
 
 

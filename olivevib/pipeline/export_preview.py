@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olivevib.files.exports import only_markers
 from olivevib.pipeline.outputs import export
 from olivevib.trial import Trial
 
@@ -41,25 +42,26 @@ class ExportPreview:
     gaps: tuple[Gap, ...]
 
 
-def export_preview(trial: Trial, to: str) -> ExportPreview:
+def export_preview(trial: Trial, to: str, ids: tuple[int, ...] | None = None) -> ExportPreview:
     """The export as it would be written now, written nowhere; raises as ``export`` does."""
     out = io.BytesIO()
-    export(trial, to, out)
+    export(trial, to, out, ids)
     path = trial.trajectory
     if path is None:
         raise trial.need("reconstruct")
+    path = only_markers(path, ids)
     text = out.getvalue()[:_HEAD].decode("utf-8", "replace").splitlines()[:LINES]
-    ids = tuple(int(i) for i in path.ids)
+    kept = tuple(int(i) for i in path.ids)
     unseen = np.asarray(~np.isfinite(path.xyz_mm).all(axis=2))
     return ExportPreview(
         size=len(out.getvalue()),
         head=tuple(text) if to in TEXTS else (),
         times=path.t_s.size,
-        markers=ids,
+        markers=kept,
         span_s=float(path.t_s[-1] - path.t_s[0]),
         frame=path.frame,
         gaps=tuple(
-            _gap(i, unseen[:, k], path.t_s) for k, i in enumerate(ids) if unseen[:, k].any()
+            _gap(i, unseen[:, k], path.t_s) for k, i in enumerate(kept) if unseen[:, k].any()
         ),
     )
 

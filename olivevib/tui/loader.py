@@ -289,12 +289,12 @@ def _made_ns(folder: Path) -> int:
     return (folder / "trial.toml").stat().st_mtime_ns
 
 
-def export_contents(folder: Path, kind: str) -> ExportPreview:
-    """What an export of the trial will hold; raises as ``pipeline.export`` does."""
+def export_contents(folder: Path, kind: str, ids: tuple[int, ...] | None) -> ExportPreview:
+    """What an export of these markers (None: all) holds; raises as ``pipeline.export`` does."""
     from olivevib.pipeline.export_preview import export_preview
     from olivevib.trial import Trial
 
-    return export_preview(Trial.open(folder), kind)
+    return export_preview(Trial.open(folder), kind, ids)
 
 
 def result_stamps(folders: Iterable[Path]) -> tuple[tuple[str, int], ...]:

@@ -1,6 +1,6 @@
 """Exports: a trajectory as files that spreadsheets, CAD, MATLAB and modal software open."""
 
 from olivevib.files.exports.door import FORMATS, export
-from olivevib.files.exports.facts import ExportFacts
+from olivevib.files.exports.facts import ExportFacts, only_markers
 
-__all__ = ["FORMATS", "ExportFacts", "export"]
+__all__ = ["FORMATS", "ExportFacts", "export", "only_markers"]

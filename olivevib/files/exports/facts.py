@@ -69,9 +69,9 @@ def only_markers(trajectory: Trajectory, ids: tuple[int, ...] | None) -> Traject
     unknown = sorted(set(ids) - set(known))
     if unknown or not ids:
         raise UsageError(
-            f"--markers: {', '.join(map(str, unknown)) or 'no id'} is not in this trajectory.",
+            f"this trajectory has no marker {', '.join(map(str, unknown)) or 'of no id'}.",
             "It has the markers " + (", ".join(map(str, sorted(known))) or "none") + ".",
-            "Name ids of that list, or leave --markers out to export all.",
+            "Name ids of that list, or none to export all.",
         )
     pick = np.array([known.index(i) for i in sorted(set(ids))], dtype=np.int64)
     columns = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -18,13 +19,23 @@ from olivevib.errors import OlivevibError
 from olivevib.tui import jobs
 from olivevib.tui.harmless import plain
 from olivevib.tui.loader import export_contents, guarded
+from olivevib.tui.screens.choose import ChooseScreen
 from olivevib.tui.screens.page import Help, Jump, Page
-from olivevib.tui.views.outputs import REPORTS, Output, output_rows, preview_text
+from olivevib.tui.views.outputs import REPORTS, Output, id_words, output_rows, preview_text
+from olivevib.values import id_list
 
 if TYPE_CHECKING:
     from olivevib.pipeline.export_preview import ExportPreview
 
 Outputs = tuple[Output, ...]
+
+
+@dataclass(frozen=True)
+class Leaving:
+    """What can leave the trial, and the markers that have paths."""
+
+    outputs: Outputs
+    ids: tuple[int, ...]
 
 
 class ReportPage(Page):
@@ -34,9 +45,9 @@ class ReportPage(Page):
     HELP_TEXT = Help(
         "The report is one page that needs no network: it says what is known, what is not, and "
         "every warning; it can be set as PDF and its figures kept as SVG files. Exports hold the "
-        "3-D paths for other programs; gaps stay gaps. Below the list stands what the marked one "
-        "will hold: its size, columns, units, gaps. Files are written whole or not at all, and "
-        "the same trial gives the same bytes.",
+        "3-D paths for other programs, of all markers or of those that f chooses; gaps stay gaps. "
+        "Below the list stands what the marked one will hold: its size, columns, units, gaps. "
+        "Files are written whole or not at all, and the same trial gives the same bytes.",
         "Make the report last: one that is older than the results says so here.",
     )
     JUMPS = (Jump("o", "#outputs"), Jump("c", "#contents"))
@@ -44,6 +55,7 @@ class ReportPage(Page):
         Binding("enter", "make", "Write", priority=False),
         Binding("e", "report", "Make the report"),
         Binding("p", "pdf", "PDF"),
+        Binding("f", "markers", "Markers to export"),
     ]
 
     class Previewed(Message):
@@ -56,6 +68,8 @@ class ReportPage(Page):
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
         self._found: Outputs = ()
+        self._ids: tuple[int, ...] = ()
+        self._chosen: tuple[int, ...] | None = None  # None: every marker
         self._contents: dict[str, ExportPreview | OlivevibError] = {}
 
     def body(self) -> ComposeResult:
@@ -72,8 +86,8 @@ class ReportPage(Page):
         table.add_columns("kind", "state", "what it holds")
         table.focus()
 
-    def read(self) -> Outputs:
-        """Which outputs are there."""
+    def read(self) -> Leaving:
+        """Which outputs are there, of which markers."""
         from olivevib import pipeline
         from olivevib.files.exports import FORMATS
         from olivevib.trial import Trial
@@ -83,28 +97,35 @@ class ReportPage(Page):
         page = self.folder / "report.html"
         places = {"report": page, "pdf": page.with_suffix(".pdf")}
         places["figures"] = page.with_name("report-figures")
+        ids: tuple[int, ...] = ()
         if trial.trajectory is not None and trial.trajectory.t_s.size:
+            ids = tuple(sorted(int(i) for i in trial.trajectory.ids))
             places |= {to: pipeline.export_place(trial, to) for to in FORMATS}
-        return tuple(Output(k, _near(p), _state(p, newest)) for k, p in places.items())
+        found = tuple(Output(k, _near(p), _state(p, newest)) for k, p in places.items())
+        return Leaving(found, ids)
 
     def show(self, value: object) -> None:
         """Fill the table; the cursor stays."""
-        if not isinstance(value, tuple):
+        if not isinstance(value, Leaving):
             return
-        self._found, self._contents = value, {}
+        self._found, self._ids, self._contents = value.outputs, value.ids, {}
+        self._fill()
+
+    def _fill(self) -> None:
         table = self.query_one("#outputs", DataTable)
         at = table.cursor_row
         table.clear()
-        for row in output_rows(value, self.olive.palette):
+        for row in output_rows(self._found, self.olive.palette):
             table.add_row(*row)
-        table.move_cursor(row=min(at, len(value) - 1))
+        table.move_cursor(row=min(at, len(self._found) - 1))
         without = "no 3-D paths yet: only the report can be made"
-        table.border_subtitle = "" if len(value) > len(REPORTS) else without
+        only = f"exports hold {id_words(self._chosen)} only" if self._chosen else ""
+        table.border_subtitle = only if self._ids else without
         self._preview()
 
     def recolour(self) -> None:
         """Draw again in the new theme."""
-        self.show(self._found)
+        self._fill()
 
     @property
     def marked(self) -> Output | None:
@@ -128,7 +149,7 @@ class ReportPage(Page):
 
     @work(thread=True, exclusive=True, group="look")
     def _looking(self, kind: str) -> None:
-        found = guarded(partial(export_contents, self.folder, kind))
+        found = guarded(partial(export_contents, self.folder, kind, self._chosen))
         if not get_current_worker().is_cancelled:
             self.post_message(self.Previewed(kind, found))
 
@@ -146,10 +167,30 @@ class ReportPage(Page):
         if self.marked.kind in REPORTS:
             self._report(self.marked.kind)
         else:
-            self.olive.start(jobs.make_export(self.folder, self.marked.kind))
+            self.olive.start(jobs.make_export(self.folder, self.marked.kind, self._chosen))
 
     def _report(self, kind: str) -> None:
         self.olive.start(jobs.make_report(self.folder, kind))
+
+    def action_markers(self) -> None:
+        """Choose the markers that exports hold."""
+        if self._ids:
+            every = ",".join(map(str, self._ids))
+            choices = (every, *(map(str, self._ids) if len(self._ids) > 1 else ()))
+            value = ",".join(map(str, self._chosen or ()))
+            title = "markers to export, such as 1,2,5-9; none: all"
+            self.app.push_screen(ChooseScreen(title, value, choices), self._take)
+
+    def _take(self, text: str | None) -> None:
+        if text is None:
+            return
+        ids = guarded(lambda: id_list(text))
+        if isinstance(ids, OlivevibError):
+            self.olive.show_error(ids)
+            return
+        self._chosen = None if not ids or set(ids) == set(self._ids) else ids
+        self._contents = {}
+        self._fill()
 
     def action_report(self) -> None:
         """Make the report."""

@@ -102,6 +102,11 @@ def _contents(out: Text, kind: str, found: ExportPreview, palette: Palette) -> N
         out.append(f"  {harmless(line, 110)}\n", palette.muted)
 
 
+def id_words(ids: Sequence[int]) -> str:
+    """Markers by their ids, cut where they are many."""
+    return harmless(f"marker{'s' * (len(ids) != 1)} {', '.join(map(str, ids))}", 60)
+
+
 def gap_words(found: ExportPreview) -> str:
     """Which markers have gaps, how many and how long."""
     if not found.gaps:
