@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import av
@@ -81,6 +82,12 @@ def rig() -> StereoRig:
     K = np.array([[900.0, 0, 320], [0, 900, 240], [0, 0, 1]])
     camera = CameraModel((640, 480), K, np.zeros(5), 0.0, 0.0, "global")
     return StereoRig(camera, camera, np.eye(3), np.array([-400.0, 0, 0]))
+
+
+def unsure(folder: Path) -> None:
+    """Give a measured trial a rig that says how sure it is: 0.2 px of lens, 0.05 mm, 0.05 mrad."""
+    sigma = np.array([*[0.2] * 4, 4e-4, 1e-3, *[0.2] * 4, 4e-4, 1e-3, *[5e-5] * 3, *[0.05] * 3])
+    write_rig(folder / "rig.toml", replace(rig(), covariance=np.diag(sigma**2)), {})
 
 
 def displacement() -> np.ndarray:

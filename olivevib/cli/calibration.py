@@ -39,14 +39,10 @@ def preview(trial: Trial, console: Console) -> int:
 
 def sigma(trial: Trial, console: Console) -> int:
     """The sigma of a marker over the working volume as CSV; needs a rig with covariance."""
-    from olivevib.pipeline.sigma import expected_sigma
+    from olivevib.pipeline.sigma import expected_sigma, sigma_csv
 
     found = expected_sigma(trial)
-    print("x_mm,y_mm,z_mm,frame_x_mm,frame_y_mm,frame_z_mm,rig_x_mm,rig_y_mm,rig_z_mm,length200_mm")
-    for k in range(len(found.xyz_mm)):
-        where = ",".join(f"{v:.0f}" for v in found.xyz_mm[k])
-        sigmas = (*found.frame_mm[k], *found.rig_mm[k], found.length_mm[k])
-        print(where + "," + ",".join(f"{v:.4f}" for v in sigmas))
+    print(sigma_csv(found), end="")
     console.say(
         f"{len(found.xyz_mm)} points that both cameras see, in the left camera's frame; frame: "
         "fresh in every frame, rig: the same in all frames, length200: of 200 mm across, from the "

@@ -14,6 +14,7 @@ from olivevib.values import counted
 
 if TYPE_CHECKING:
     from olivevib.calibration.guidance import Guidance
+    from olivevib.calibration.sigma_map import SigmaMap
     from olivevib.pipeline import NewTrial
 
 
@@ -68,6 +69,21 @@ def preview_board(folder: Path, show: Callable[[Guidance], None]) -> Work:
     return Work(f"{_name(folder)}: board", do)
 
 
+def map_sigma(folder: Path, show: Callable[[SigmaMap], None]) -> Work:
+    """The sigma to expect over the working volume; also as CSV into ``exports/``."""
+
+    def do(tick: Tick) -> Result:
+        from olivevib.pipeline.sigma import expected_sigma, write_sigma
+        from olivevib.trial import Trial
+
+        trial = Trial.open(folder)
+        found = expected_sigma(trial)
+        show(found)
+        return Result(f"The map of sigma is also {harmless(write_sigma(trial, found))}")
+
+    return Work(f"{_name(folder)}: sigma", do)
+
+
 def make_report(folder: Path, kind: str = "report") -> Work:
     """One self-contained page beside the trial; "pdf" and "figures" come with the page."""
 
@@ -85,8 +101,8 @@ def make_report(folder: Path, kind: str = "report") -> Work:
     return Work(f"{_name(folder)}: report", do)
 
 
-def make_export(folder: Path, to: str) -> Work:
-    """The 3-D paths for another program, into ``exports/``."""
+def make_export(folder: Path, to: str, ids: tuple[int, ...] | None = None) -> Work:
+    """The 3-D paths of these markers (None: all) for another program, into ``exports/``."""
 
     def do(tick: Tick) -> Result:
         from olivevib import pipeline
@@ -95,7 +111,7 @@ def make_export(folder: Path, to: str) -> Work:
         trial = Trial.open(folder)
         target = pipeline.export_place(trial, to)
         tick(0, 1, f"writing {to}")
-        cautions = pipeline.export(trial, to, target)
+        cautions = pipeline.export(trial, to, target, ids)
         return Result(f"The export is {harmless(target)}", tuple(cautions))
 
     return Work(f"{_name(folder)}: export {to}", do)
