@@ -7,6 +7,7 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tui_scene as scene
 from small_videos import make_video
@@ -14,6 +15,7 @@ from test_row_time_verb import film
 from textual.widgets import DataTable, Input, Static
 from tui_app import press, screen_text, settle, started
 
+from olivevib.cli import main
 from olivevib.errors import InputError
 from olivevib.pipeline.machine import Check
 from olivevib.progress import Cancelled
@@ -74,6 +76,25 @@ async def test_from_the_list_to_results_report_and_back_by_keys(workspace):
         assert "made" in screen_text(app)
         await press(pilot, "escape", "escape")
         assert isinstance(app.screen, TrialsPage)
+
+
+async def test_an_export_holds_the_markers_that_were_chosen_by_keys(workspace):
+    target = workspace / "trials/2026-11-20_T04/exports/2026-11-20_T04.csv"
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "e", "down", "down", "down")
+        assert "holds    markers 1, 2, 5, 9" in words(app, "#preview")
+        await press(pilot, "f", "tab", "text:9,2", "enter")
+        assert "exports hold markers 9, 2 only" in screen_text(app)
+        assert "holds    markers 2, 9" in words(app, "#preview")
+        await press(pilot, "enter")
+        rows = target.read_text(encoding="utf-8").splitlines()
+        assert {row.split(",")[1] for row in rows if row[:1].isdigit()} == {"2", "9"}
+        await press(pilot, "f", "down", "down", "enter")  # the list: all, 1, 2, 5, 9
+        assert "exports hold marker 2 only" in screen_text(app)
+        await press(pilot, "f", "tab", *["backspace"] * 3, "text:7", "enter")
+        assert "this trajectory has no marker 7" in words(app, "#preview")
+        await press(pilot, "f", "tab", "backspace", "enter")
+        assert "holds    markers 1, 2, 5, 9" in words(app, "#preview")
 
 
 @pytest.mark.slow
@@ -426,6 +447,48 @@ async def test_a_new_trial_is_made_from_two_recordings_by_keys(workspace, tmp_pa
     assert (raw / "left.avi").is_file()
 
 
+async def test_several_accelerometers_are_added_and_taken_out_by_keys(workspace, tmp_path):
+    raw = tmp_path / "raw"
+    raw.mkdir()
+    for side in ("left", "right"):
+        make_video(raw / f"{side}.avi", frames=5, size=(640, 480))
+    for name in ("a", "b", "c"):
+        rows = "".join(f"{k / 100:.2f},0.0,9.81,{0.1 * (k % 7):.2f}\n" for k in range(200))
+        (raw / f"{name}.csv").write_text(f"t [s],x [m/s2],y [m/s2],z [m/s2]\n{rows}")
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "n", "text:T07")
+        for side in ("left", "right"):
+            app.screen.query_one(f"#{side}", Input).value = str(raw / f"{side}.avi")
+        for line in ("accelerometer", "accelerometer2", "accelerometer3"):
+            if line != "accelerometer":
+                await press(pilot, "f2")
+                assert app.focused.id == line
+            app.screen.query_one(f"#{line}", Input).focus()
+            name = {"accelerometer": "a", "accelerometer2": "b"}.get(line, "c")
+            keys = ("enter", "text:5", "enter", "text:x,-z,y", "enter", "text:0,25,-8")
+            await press(pilot, f"text:{raw / name}.csv", *keys)
+        app.screen.query_one("#accelerometer_marker", Input).value = "9"
+        app.screen.query_one("#accelerometer3_lever", Input).value = "25"
+        await press(pilot, "ctrl+s")
+        assert "“lever of 3, mm”: '25' cannot be read" in words(app, ".dialog > Static")
+        await press(pilot, "escape")
+        assert app.focused.id == "accelerometer3_lever"
+        app.screen.query_one("#accelerometer3_lever", Input).value = ""
+        app.screen.query_one("#accelerometer2", Input).focus()
+        await press(pilot, "f3")
+        assert app.focused.id == "accelerometer2"
+        assert not app.screen.query("#accelerometer3")
+        await press(pilot, "ctrl+s")
+        assert isinstance(app.screen, TrialPage), screen_text(app)
+    trial = Trial.open(workspace / "trials/T07")
+    sensors = trial.settings.accelerometers
+    assert [(s.marker, s.axes, s.lever_mm) for s in sensors] == [
+        (9, ("x", "-z", "y"), (0, 25, -8)), (5, ("x", "-z", "y"), (0.0, 0.0, 0.0))
+    ]  # fmt: skip
+    copies = [trial.path(s.file).read_bytes() for s in sensors]
+    assert copies == [(raw / f"{name}.csv").read_bytes() for name in ("a", "c")]
+
+
 async def test_a_new_trial_takes_over_the_settings_of_the_marked_one(workspace):
     async with started(workspace) as (app, pilot):
         await press(pilot, "N")
@@ -444,6 +507,28 @@ async def test_the_calibration_page_tells_coverage_and_verdict(workspace):
         assert "right camera" in screen_text(app)
         await press(pilot, "escape", "escape", "down", "down", "enter", "b")
         assert "Not calibrated yet" in screen_text(app)
+
+
+async def test_the_sigma_to_expect_is_mapped_by_key_as_the_command_prints_it(workspace, capsys):
+    folder = workspace / "trials/2026-11-20_T04"
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter", "b", "S")
+        assert "carries no covariance" in words(app, ".dialog > Static")
+        await press(pilot, "escape")
+        scene.unsure(folder)
+        await press(pilot, "S")
+        assert "exports/2026-11-20_T04-sigma.csv" in told(app), screen_text(app)
+        map_ = words(app, "#verdict-text")
+    assert main(["calibrate", "--sigma", "2026-11-20_T04"]) == 0
+    printed = capsys.readouterr().out
+    assert (folder / "exports/2026-11-20_T04-sigma.csv").read_text(encoding="utf-8") == printed
+    rows = np.array([line.split(",") for line in printed.splitlines()[1:]], dtype=float)
+    assert f"{len(rows)} places" in map_
+    farthest = rows[rows[:, 2] == rows[:, 2].max()]
+    depth = np.hypot(farthest[:, 5], farthest[:, 8]).max()
+    assert f"{farthest[0, 2]:.0f} mm" in map_
+    assert f"{depth:.3f}" in map_.split("in depth")[1].splitlines()[1]
+    assert f"{rows[:, 9].max():.3f} mm." in map_
 
 
 async def test_a_new_trial_that_cannot_be_made_says_why_and_keeps_the_form(workspace):
@@ -715,6 +800,46 @@ async def test_this_machine_is_looked_at(workspace, monkeypatch):
         await press(pilot, "D")
         assert "reads webcams" in screen_text(app)
         assert "1 missing" in screen_text(app)
+
+
+async def test_markers_and_a_board_are_printed_as_the_command_prints_them(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "M", "ctrl+s")
+        assert "“marker size, mm”: how large the markers are" in words(app, ".dialog > Static")
+        await press(pilot, "escape", "enter", "enter", "text:1-8", "enter", "text:60", "enter")
+        assert "8 markers of olive49, 60 mm, on A4, 2 pages" in words(app, "#found-text")
+        await press(pilot, "ctrl+s")
+        assert "check the 150 mm ruler" in told(app)
+        app.screen.query_one("#ids", Input).value = "900"
+        await press(pilot, "enter")
+        assert "library olive49 has no marker 900" in words(app, "#found-text")
+        app.screen.query_one("#ids", Input).value = "1-8"
+        app.screen.query_one("#output", Input).value = "sheet.svg"
+        await press(pilot, "ctrl+s")
+        assert "sheet-1.svg and 1 file more" in told(app)
+        app.screen.query_one("#output", Input).value = "sheet.png"
+        await press(pilot, "ctrl+s")
+        assert "A print is a PDF or an SVG" in words(app, ".dialog > Static")
+        await press(pilot, "escape")
+        app.screen.query_one("#output", Input).value = ""
+        app.screen.query_one("#what", Input).value = "board"
+        app.screen.query_one("#board", Input).value = "coded:5x5,pitch=60,size=44"
+        app.screen.query_one("#paper", Input).value = "A5"
+        await press(pilot, "enter")
+        assert "Choose “paper” A2" in words(app, "#found-text")
+        app.screen.query_one("#paper", Input).value = ""
+        await press(pilot, "ctrl+s")
+        assert "board.pdf" in told(app)
+    sheet = ["markers", "sheet", "--ids", "1-8", "--size", "60", "-o"]
+    board = ["markers", "board", "--board", "coded:5x5,pitch=60,size=44", "-o"]
+    for argv, name, file in (
+        (sheet, "markers.pdf", "cli.pdf"),
+        (sheet, "sheet-2.svg", "cli.svg"),
+        (board, "board.pdf", "cli-board.pdf"),
+    ):
+        assert main([*argv, str(workspace / file)]) == 0
+        same = "cli-2.svg" if file.endswith("svg") else file
+        assert (workspace / name).read_bytes() == (workspace / same).read_bytes()
 
 
 @pytest.mark.slow

@@ -42,6 +42,7 @@ WALK = (
     ("calibration", "escape b"),
     ("report", "escape e"),
     ("export", "down down down"),
+    ("export_markers", "f down down enter"),
     ("settings", "escape s right_square_bracket right_square_bracket"),
     ("edit", "enter"),
     ("pictures", "escape escape k"),
@@ -57,6 +58,7 @@ WALK = (
     ("plan_one", "tab tab tab 2 5 enter"),
     ("batch", "escape B"),
     ("row_time", "escape W"),
+    ("prints", "escape M enter enter 1 - 8 enter 6 0 enter"),
     ("machine", "escape D"),
     ("outcome", "escape enter A enter"),
 )
@@ -181,6 +183,14 @@ async def test_sunlight_and_no_colour(svg, workspace, monkeypatch):
         if await taken(app, pilot) != svg(name="without colour"):
             changed.append("without colour")
     assert not changed
+
+
+@pytest.mark.parametrize("size", SIZES, ids=["120x40", "80x24"])
+async def test_the_map_of_sigma_looks_as_it_did(svg, workspace, size):
+    scene.unsure(workspace / "trials/2026-11-20_T04")
+    async with started(workspace, size) as (app, pilot):
+        await press(pilot, "enter", "b", "S")
+        assert await taken(app, pilot) == svg(name=name_of("sigma", size))
 
 
 async def picking(app, pilot, workspace) -> None:

@@ -11,17 +11,16 @@ from olivevib.cli.console import Console
 
 if TYPE_CHECKING:
     from olivevib.marker import MarkerLibrary
+    from olivevib.pipeline.prints import Prints
 
 FEW = 24  # codes of a generated library: a tree with fewer markers is hardly measured
 
 
 def _library(name: str) -> MarkerLibrary:
-    """A library by name or file; a bare file name is also looked for under markers/."""
     from olivevib.marker import load_library
+    from olivevib.trial.workspace import find_library
 
-    here = Path("markers") / name
-    beside = name.endswith(".toml") and not Path(name).exists() and here.exists()
-    return load_library(str(here) if beside else name)
+    return load_library(find_library(name, Path()))
 
 
 def list_(arguments: argparse.Namespace, console: Console) -> int:
@@ -78,31 +77,28 @@ def draw(arguments: argparse.Namespace, console: Console) -> int:
 
 def sheet(arguments: argparse.Namespace, console: Console) -> int:
     """Print markers at exact size on sheets."""
-    from olivevib.files.prints import sheet_pages, write_pages
-    from olivevib.pipeline.libraries import only_known
+    from olivevib.pipeline.prints import marker_sheets
 
-    library = _library(arguments.library)
-    ids = values.id_list(arguments.ids) or tuple(int(i) for i in library.ids)
-    only_known(library, ids)
-    pages = sheet_pages(library, ids, arguments.size, arguments.paper)
-    _tell(write_pages(Path(arguments.output), pages, f"{library.name} markers"), console)
-    return 0
+    library, ids = _library(arguments.library), values.id_list(arguments.ids)
+    prints = marker_sheets(library, ids, arguments.size, arguments.paper)
+    return _write(prints, arguments.output, console)
 
 
 def board(arguments: argparse.Namespace, console: Console) -> int:
     """Print a calibration board at exact size."""
-    from olivevib.calibration.boards import parse_board
-    from olivevib.files.prints import board_page, write_pages
+    from olivevib.pipeline.prints import board_sheet
 
-    page = board_page(parse_board(arguments.board), _library(arguments.library), arguments.paper)
-    _tell(write_pages(Path(arguments.output), [page], arguments.board), console)
-    return 0
+    prints = board_sheet(arguments.board, _library(arguments.library), arguments.paper)
+    return _write(prints, arguments.output, console)
 
 
-def _tell(paths: list[Path], console: Console) -> None:
-    for path in paths:
+def _write(prints: Prints, output: str, console: Console) -> int:
+    from olivevib.pipeline.prints import ADVICE, write_prints
+
+    for path in write_prints(prints, Path(output)):
         print(path)
-    console.say("Print at 100 % (no fit to page) and check the 150 mm ruler on the sheet.")
+    console.say(ADVICE)
+    return 0
 
 
 def check(arguments: argparse.Namespace, console: Console) -> int:

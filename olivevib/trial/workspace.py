@@ -44,6 +44,13 @@ def find_preset(name: str, workspace: Path) -> str:
     return str(kept) if name and kept.is_file() else name
 
 
+def find_library(name: str, workspace: Path) -> str:
+    """A marker library by name or file; a bare file name is also looked for under ``markers/``."""
+    kept = workspace / "markers" / name
+    beside = name.endswith(".toml") and not Path(name).exists() and kept.exists()
+    return str(kept) if beside else name
+
+
 def place_for_new(name: str, workspace: Path) -> Path:
     """Where a new trial goes: a bare name under ``trials/`` of a workspace, else the path given."""
     path = Path(name)

@@ -14,6 +14,7 @@ from olivevib.values import counted
 
 if TYPE_CHECKING:
     from olivevib.batch import TrialResult
+    from olivevib.pipeline.prints import Prints
 
 
 def run_batch(
@@ -86,6 +87,19 @@ def board_row_time(folder: Path, workspace: Path, show: Callable[[str], object])
         return Result(words)
 
     return Work("row time", do)
+
+
+def make_prints(prints: Prints, target: Path) -> Work:
+    """Pages of markers, or a board, into a PDF or SVG files."""
+
+    def do(tick: Tick) -> Result:
+        from olivevib.pipeline.prints import ADVICE, write_prints
+
+        first, *more = write_prints(prints, target)
+        others = f" and {counted(len(more), 'file')} more" if more else ""
+        return Result(f"{harmless(first)}{others}. {ADVICE}")
+
+    return Work("print", do)
 
 
 def keep_preset(folder: Path, name: str, workspace: Path) -> Work:

@@ -35,7 +35,7 @@ def write_pages(path: Path, pages: Sequence[Page], title: str = "") -> list[Path
     raise UsageError(
         f"{path} cannot be written",
         f"A print is a PDF or an SVG, not {path.suffix or 'a name without ending'}.",
-        "Let the name after -o end in .pdf or .svg.",
+        "Let its name end in .pdf or .svg.",
     )
 
 
@@ -58,6 +58,6 @@ def _write(path: Path, content: bytes) -> Path:
         raise InputError(
             f"{path} cannot be written",
             error.strerror or str(error),
-            "Choose another place with -o.",
+            "Choose another place.",
         ) from None
     return path

@@ -27,6 +27,7 @@ TOOLS = {
     "batch": "BatchPage",
     "row_time": "RowTimePage",
     "machine": "MachinePage",
+    "prints": "PrintsPage",
 }  # about the workspace, not one trial
 
 

@@ -59,6 +59,7 @@ class TrialsPage(Page):
         Binding("P", "tool('planning')", "Plan a recording", show=False),
         Binding("B", "tool('batch')", "Run many trials, season report", show=False),
         Binding("W", "tool('row_time')", "Row time of a camera", show=False),
+        Binding("M", "tool('prints')", "Print markers and boards", show=False),
         Binding("D", "tool('machine')", "What works on this machine", show=False),
     ]
 

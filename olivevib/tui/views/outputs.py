@@ -88,9 +88,8 @@ def preview_text(output: Output, found: ExportPreview | None, palette: Palette) 
 
 
 def _contents(out: Text, kind: str, found: ExportPreview, palette: Palette) -> None:
-    ids = ", ".join(map(str, found.markers))
     rows = (
-        ("holds", f"markers {ids}; {found.times} times over {found.span_s:.2f} s"),
+        ("holds", f"{id_words(found.markers)}; {found.times} times over {found.span_s:.2f} s"),
         ("columns", COLUMNS.get(kind, HOLDS.get(kind, ""))),
         ("axes", f"of the {found.frame}"),
         ("gaps", gap_words(found)),
