@@ -236,7 +236,11 @@ def test_an_alias_that_looks_slow_tells_no_offset(monkeypatch):
         return np.array([3 * np.cos(turn), 1.5 * np.sin(turn) + 2 * np.sin(sway), 1400])
 
     pairs = [late_tracks(shaken, 0.0087, 0.0, 0.01) for _ in range(2)]
-    left, right = ([replace(p[k], id=4 + m) for m, p in enumerate(pairs)] for k in (0, 1))
+    left, right = (
+        [replace(p[k], id=4 + m, centre_cov_px2=p[k].centre_cov_px2 * (0.01 / SIGMA) ** 2)
+         for m, p in enumerate(pairs)]
+        for k in (0, 1)
+    )  # fmt: skip
     assert clock_from_motion(left, right, rig(), TrialClock()).source == "unknown"
     monkeypatch.setattr("olivevib.reconstruction.trial_offset.MISSED", 1e9)
     wrong = clock_from_motion(left, right, rig(), TrialClock())
