@@ -56,9 +56,9 @@ class CalibrationPage(Page):
         Jump("v", "#verdict"),
     )
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("t", "again", "Calibrate again"),
-        Binding("p", "preview", "Go through the board"),
-        Binding("S", "sigma", "Sigma to expect"),
+        Binding("t", "again", "Calibrate"),
+        Binding("p", "preview", "Go through board"),
+        Binding("S", "sigma", "Sigma"),
         Binding("o", "camera", "Next picture"),
     ]
     _found: CalibrationFacts | None = None
