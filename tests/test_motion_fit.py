@@ -9,7 +9,7 @@ import pytest
 from test_motion_parts import anchor_of, scene
 
 from olivevib.reconstruction.motion import Anchor, MotionSettings, fit_motion
-from olivevib.reconstruction.motion.decide import Facts, zone
+from olivevib.reconstruction.motion.decide import Facts, decide, zone
 from olivevib.reconstruction.motion.evaluate import phase_of
 from olivevib.studies import blind
 from olivevib.studies.blind_scenes import Scene, orbit, rig, sight
@@ -260,3 +260,12 @@ def test_slow_motion_that_no_knots_follow_is_no_line_near_the_frame_rate():
     assert zone(31.64, facts) == "slow sway"
     assert zone(33.28, facts) == ""
     assert zone(31.64, replace(facts, offset_s=0.010)) == ""
+
+
+def test_an_offset_that_the_fit_found_itself_is_no_anchor():
+    _, fit = fitted(scene(25.3))
+    facts = Facts(fit.branches, 30.0, 4.0, 0.009, 0.3, 1.0, 1.0, 99.0, np.ones(3), np.zeros(3))
+    found = Anchor(right_offset_s=0.009, right_offset_sigma_s=4e-3, offset_source="unknown")
+    assert decide(facts, found, MotionSettings()).status is LineStatus.AMBIGUOUS
+    told = replace(found, offset_source="calibration")
+    assert decide(facts, told, MotionSettings()).status is LineStatus.CONFIRMED

@@ -160,7 +160,11 @@ def _doubts(facts: Facts, settings: MotionSettings) -> list[str]:
 def no_anchor(anchor: Anchor) -> bool:
     """Nothing known from elsewhere that could tell aliases apart."""
     rows = np.isinf([anchor.left_row_time_sigma_s, anchor.right_row_time_sigma_s]).all()
-    return bool(rows and np.isinf(anchor.right_offset_sigma_s))
+    return bool(rows and not _offset_known(anchor))
+
+
+def _offset_known(anchor: Anchor) -> bool:
+    return bool(np.isfinite(anchor.right_offset_sigma_s)) and anchor.offset_source != "unknown"
 
 
 def _alike(facts: Facts) -> str:
@@ -182,7 +186,7 @@ def _anchor_words(anchor: Anchor) -> str:
         if np.isfinite(sigma):
             source = anchor.row_time_source
             words.append(f"{side} row time {value:.2f} ± {sigma:.2f} µs ({source})")
-    if np.isfinite(anchor.right_offset_sigma_s):
+    if _offset_known(anchor):
         offset, sigma = 1e3 * anchor.right_offset_s, 1e3 * anchor.right_offset_sigma_s
         words.append(f"offset {offset:.2f} ± {sigma:.2f} ms ({anchor.offset_source})")
     return ", ".join(words)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,19 +20,19 @@ from olivevib.reconstruction.motion.finish import (
     with_gain_sigma,
 )
 from olivevib.reconstruction.motion.free import fit_free
-from olivevib.reconstruction.motion.offset import WEAK_S, with_offset
-from olivevib.reconstruction.motion.pixels import Pixels, look
+from olivevib.reconstruction.motion.offset import WEAK_S
 from olivevib.reconstruction.motion.prepare import (
-    layout,
-    model_of,
-    offset_sigma,
-    sway_precision,
     time_prior,
 )
-from olivevib.reconstruction.motion.problem import Pose, Whitening
+from olivevib.reconstruction.motion.prepared import (
+    Prepared,
+    band_of,
+    candidate_frequencies,
+    growing,
+    prepare,
+)
 from olivevib.reconstruction.motion.sightings import Observations
 from olivevib.reconstruction.motion.solve import SHARED, Branch, Model, settle, with_frequency
-from olivevib.reconstruction.motion.start import about_sway
 from olivevib.reconstruction.motion.types import (
     Anchor,
     BranchTable,
@@ -41,28 +40,11 @@ from olivevib.reconstruction.motion.types import (
     MotionFit,
     MotionSettings,
 )
-from olivevib.reconstruction.motion.wander import Growth, growth_of, pace_of, weigh_paces
+from olivevib.reconstruction.motion.wander import growth_of, pace_of, weigh_paces
 
 DRAWING_SHARE = 3e-3  # of a row time: a drawing keeps 0.3 % of the slant at which it was drawn
+NEAR_S = 4e-3  # sigma of an offset that a fit found a valley away from its start
 WORSE = 1.3  # noise or chi2 above which a wandering speed is looked for
-
-
-@dataclass(frozen=True)
-class Prepared:
-    """Everything before the first frequency."""
-
-    observations: Observations
-    rig: StereoRig
-    anchor: Anchor
-    settings: MotionSettings
-    pixels: Pixels
-    poses: tuple[Pose, ...]
-    whites: tuple[Whitening, ...]
-    model: Model
-    start_s: float
-    end_s: float
-    offset_sigma_s: float
-    offset_found: bool
 
 
 def fit_motion(
@@ -104,10 +86,23 @@ def fit_motion(
             weighed = br.weigh(ready.model, candidates, ready.offset_sigma_s, tick)
             model, best = refine(ready, ready.model, weighed.branches[0])
     if clock.right_offset_sigma_s > WEAK_S:
+        before = float(best.theta[1])
         best, slips = br.unslipped(with_open_offset(ready, model), best)
         ready = replace(ready, offset_found=ready.offset_found and not slips)
+        if abs(best.theta[1] - before) > 0.25 / best.theta[0]:  # all was weighed at other times
+            return from_offset(ready, best, tick)
         model, best = refine(ready, model, best)
     return finished(ready, (model, best), weighed, kind, fast)
+
+
+def from_offset(ready: Prepared, best: Branch, tick: Tick) -> MotionFit:
+    """Everything anew from the offset of a branch."""
+    rows = ready.observations.reference_row - ready.anchor.reference_row
+    offset = float(best.theta[1] - rows * (best.theta[4] - best.theta[3]))
+    near = replace(ready.anchor, right_offset_s=offset, right_offset_sigma_s=NEAR_S)
+    fit = fit_motion(ready.observations, ready.rig, near, ready.settings, tick)
+    timing = replace(fit.timing, offset_slip=not ready.offset_found)
+    return replace(fit, anchor=ready.anchor, timing=timing)
 
 
 def with_open_offset(ready: Prepared, model: Model) -> Model:
@@ -117,64 +112,6 @@ def with_open_offset(ready: Prepared, model: Model) -> Model:
     precision = model.precision.copy()
     precision[:SHARED, :SHARED] = loose
     return replace(model, precision=precision)
-
-
-def prepare(
-    observations: Observations,
-    rig: StereoRig,
-    anchor: Anchor,
-    settings: MotionSettings,
-    phase: Callable[[Floats], Floats] | None = None,
-    size: Callable[[Floats], Floats] | None = None,
-) -> Prepared:
-    """Pixels, poses and the linear problem about the sway; phase, size: of an uneven line."""
-    pixels = look(observations, settings.knot_s, settings.harmonics, phase, size)
-    searched, found = with_offset(observations, rig, anchor, settings, pixels)
-    clock, knots, start, end = layout(observations, searched, settings, pixels.knot_s)
-    poses, problems, whites = about_sway(
-        observations, rig, pixels, clock, knots, sway_precision(settings)
-    )
-    model = model_of(problems, observations, searched, settings, knots, clock.mid_s)
-    sigma = offset_sigma(searched, settings)
-    return Prepared(
-        observations=observations,
-        rig=rig,
-        anchor=anchor,
-        settings=settings,
-        pixels=pixels,
-        poses=poses,
-        whites=whites,
-        model=model,
-        start_s=start,
-        end_s=end,
-        offset_sigma_s=sigma,
-        offset_found=found,
-    )
-
-
-def growing(ready: Prepared, grown: Growth) -> Prepared:
-    """Everything prepared again for an amplitude that grows evenly."""
-    again = prepare(ready.observations, ready.rig, ready.anchor, ready.settings, None, grown.size)
-    return replace(again, model=replace(again.model, growth=grown.share))
-
-
-def candidate_frequencies(ready: Prepared) -> Floats:
-    """All frequencies of the band, and a little beyond, that could show what was seen."""
-    rate, span = ready.observations.frame_rate_hz, ready.end_s - ready.start_s
-    low, high = ready.settings.band_hz
-    band = band_of(ready)
-    peaks = ready.pixels.peaks_hz + br.zone_peak(ready.model, rate, (low, high), span)
-    found = br.families(peaks, rate, band)
-    if not found.size:
-        raise ValueError(f"nothing periodic appears in the band of {low:g}-{high:g} Hz")
-    return br.merged(found, 0.3 / span)
-
-
-def band_of(ready: Prepared) -> tuple[float, float]:
-    """The band, and half a frame rate more where nobody declared it: rivals hide there."""
-    low, high = ready.settings.band_hz
-    more = 0.0 if ready.settings.band_declared else ready.observations.frame_rate_hz / 2
-    return low, high + more
 
 
 def refine(ready: Prepared, model: Model, branch: Branch) -> tuple[Model, Branch]:
