@@ -828,7 +828,8 @@ async def test_markers_and_a_board_are_printed_as_the_command_prints_them(worksp
         await press(pilot, "enter")
         assert "Choose “paper” A2" in words(app, "#found-text")
         app.screen.query_one("#paper", Input).value = ""
-        await press(pilot, "ctrl+s")
+        assert await pilot.click("#make")  # by mouse as well
+        await settle(pilot)
         assert "board.pdf" in told(app)
     sheet = ["markers", "sheet", "--ids", "1-8", "--size", "60", "-o"]
     board = ["markers", "board", "--board", "coded:5x5,pitch=60,size=44", "-o"]
