@@ -23,6 +23,8 @@ class Entry:
         try:
             found: StudyFunction = getattr(import_module(f"olivevib.studies.{module}"), function)
         except ModuleNotFoundError as error:
+            if (error.name or "").startswith("olivevib"):
+                raise  # a file of ours is missing, nothing that could be installed
             raise UsageError(
                 f"{self.name} needs the package {error.name}, which is not installed.",
                 "It compares olivevib with other libraries.",

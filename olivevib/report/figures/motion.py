@@ -90,7 +90,7 @@ def time_series(
                 _fitted(row, lines[marker_id], (t_s, xyz), window)
         canvas.row_names(figure, grid, [names[i] for i in ids])
         canvas.column_heads(figure, grid, ["x, mm", "y, mm", "z, mm"])
-        _frame(grid)
+        time_ticks(grid)
 
     return canvas.draw("close" if window.close else f"motion{ids[0]}", title, height, paint)
 
@@ -136,7 +136,8 @@ def _fitted(row: Sequence[Axes], line: Line, data: tuple[Floats, Floats], window
         ax.plot(t, curve, color=canvas.QUIET, lw=0.6, zorder=1)
 
 
-def _frame(grid: Sequence[Sequence[Axes]]) -> None:
+def time_ticks(grid: Sequence[Sequence[Axes]]) -> None:
+    """Ticks of light panels over the trial clock, numbers at the left and at the bottom."""
     for r, row in enumerate(grid):
         for k, ax in enumerate(row):
             x = MaxNLocator(6, prune="upper").tick_values(*ax.get_xlim())

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from olivevib.arrays import Floats
 from olivevib.reconstruction.trajectory import Trajectory
 from olivevib.report.figures import canvas
-from olivevib.report.figures.motion import whole
+from olivevib.report.figures.motion import time_ticks, whole
 from olivevib.report.words import number
 from olivevib.vibration import Attitude, Deflection, Transmission
 
@@ -196,13 +196,7 @@ def rotations(path: Trajectory, names: Mapping[int, str], ids: Sequence[int]) ->
                 ax.set_ylim(-reach, reach)
         canvas.row_names(figure, grid, [names[i] for i in ids])
         canvas.column_heads(figure, grid, ["about x, mrad", "about y, mrad", "about z, mrad"])
-        for r, row in enumerate(grid):
-            for k, ax in enumerate(row):
-                x = MaxNLocator(6, prune="upper").tick_values(*ax.get_xlim())
-                y = MaxNLocator(4).tick_values(*ax.get_ylim())
-                canvas.light_ticks(ax, x, y, left=k == 0, bottom=r == len(grid) - 1)
-        for ax in grid[-1]:
-            ax.set_xlabel("trial clock, s")
+        time_ticks(grid)
 
     title = f"Rotation of {len(ids)} markers over time"
     return canvas.draw("rotation", title, 0.58 + 0.74 * len(ids), paint)
