@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from olivevib.arrays import Floats
+from olivevib.planning.zones import SWAY_HZ
 from olivevib.reconstruction.motion.types import Anchor, BranchTable, MotionSettings
 from olivevib.vibration.types import LineStatus
 
@@ -25,7 +26,6 @@ STEP_S = 5e-3  # cameras nearer than this to the same instant count as in step
 NARROW_HZ = 0.3
 CHIRP_HZ_S = 0.5  # change of the apparent frequency that, left unexplained, is a chirp
 CHIRP_MISFIT = 25.0  # variance left over the localiser's that a changing speed must explain
-SWAY_HZ = 2.5  # of slow motion that no knots follow to the end: half width of its zone, at least
 SWAY_SHARE = 0.4  # over the knot spacing: half width of the sway's zone, Hz
 
 
