@@ -11,6 +11,8 @@ from test_motion_parts import anchor_of, scene
 from olivevib.reconstruction.motion import Anchor, MotionSettings, fit_motion
 from olivevib.reconstruction.motion.decide import Facts, decide, zone
 from olivevib.reconstruction.motion.evaluate import phase_of
+from olivevib.reconstruction.motion.offset import Lines, with_offset
+from olivevib.reconstruction.motion.prepared import prepare
 from olivevib.studies import blind
 from olivevib.studies.blind_scenes import Scene, orbit, rig, sight
 from olivevib.studies.study import Effort
@@ -252,6 +254,28 @@ def test_an_unknown_offset_slips_by_no_period_and_hides_no_double():
     offset = s.offset_s + seen.reference_row * (s.readout_s[1] - s.readout_s[0]) / 720
     assert abs(fit.timing.right_offset_s - offset) < 5 * fit.timing.sigma("right_offset_s")
     assert not fit.timing.offset_slip
+
+
+def test_a_second_harmonic_that_looks_like_sway_does_not_hide_the_offset():
+    """44.757 Hz at 30 frames/s: its second harmonic appears at 0.49 Hz, among the sway."""
+    s = scene(44.757, offset_s=-0.0095, span_s=4.5)
+    anchor = replace(anchor_of(s), right_offset_s=0.0, right_offset_sigma_s=np.inf)
+    seen = sight(s, rig(), np.random.default_rng(0))
+    pixels = prepare(seen, rig(), anchor, MotionSettings()).pixels
+    near, clear = with_offset(seen, rig(), anchor, MotionSettings(), pixels)
+    at_rows = s.offset_s + seen.reference_row * (s.readout_s[1] - s.readout_s[0]) / 720
+    assert clear
+    assert abs(near.right_offset_s - at_rows) < 2 * near.right_offset_sigma_s
+    assert Lines.of(pixels.peaks_hz[0], 30.0).slow_hz == pytest.approx((0.486,), abs=0.01)
+
+
+def test_an_offset_that_was_searched_in_vain_confirms_nothing():
+    _, fit = fitted(scene(25.3))
+    facts = Facts(fit.branches, 30.0, 4.0, 0.009, 0.3, 1.0, 1.0, 99.0, np.ones(3), np.zeros(3))
+    decision = decide(replace(facts, offset_lost=True), fit.anchor, MotionSettings())
+    assert decision.status is LineStatus.SUPPORTED
+    assert "out of step" in decision.reasons[0]
+    assert decide(facts, fit.anchor, MotionSettings()).status is LineStatus.CONFIRMED
 
 
 def test_slow_motion_that_no_knots_follow_is_no_line_near_the_frame_rate():

@@ -48,6 +48,7 @@ class Facts:
     sigma_mm: Floats
     fast_hz_s: float = 0.0
     beside: float = 0.0
+    offset_lost: bool = False
 
 
 @dataclass(frozen=True)
@@ -151,6 +152,8 @@ def _doubts(facts: Facts, settings: MotionSettings) -> list[str]:
         doubts.append("a second line stands beside it: its speed may wander")
     if facts.noise_scale > NOISE_LIMIT:
         doubts.append(f"the pictures scatter {facts.noise_scale:.1f} times more than they should")
+    if facts.offset_lost:
+        doubts.append("no slow sway shows by how much the cameras are out of step")
     low, high = settings.band_hz
     if not low <= f <= high:
         doubts.append(f"it lies outside the band of {low:g}-{high:g} Hz")

@@ -62,7 +62,14 @@ def fit_motion(
     settings = settings or MotionSettings()
     if not settings.periodic:
         return fit_free(observations, rig, clock, settings)
-    ready = prepare(observations, rig, clock, settings)
+    return _fit_periodic(prepare(observations, rig, clock, settings), tick)
+
+
+def _fit_periodic(ready: Prepared, tick: Tick, lost: bool = False) -> MotionFit:
+    """lost: the offset was searched for before, and sway did not show it."""
+    observations, rig = ready.observations, ready.rig
+    clock, settings = ready.anchor, ready.settings
+    lost = lost or not ready.offset_found
     candidates = candidate_frequencies(ready)
     weighed = br.weigh(ready.model, candidates, ready.offset_sigma_s, tick)
     model, best = refine(ready, ready.model, weighed.branches[0])
@@ -90,17 +97,18 @@ def fit_motion(
         best, slips = br.unslipped(with_open_offset(ready, model), best)
         ready = replace(ready, offset_found=ready.offset_found and not slips)
         if abs(best.theta[1] - before) > 0.25 / best.theta[0]:  # all was weighed at other times
-            return from_offset(ready, best, tick)
+            return _from_offset(ready, best, tick, lost)
         model, best = refine(ready, model, best)
-    return finished(ready, (model, best), weighed, kind, fast)
+    return finished(ready, (model, best), weighed, kind, (fast, lost))
 
 
-def from_offset(ready: Prepared, best: Branch, tick: Tick) -> MotionFit:
+def _from_offset(ready: Prepared, best: Branch, tick: Tick, lost: bool) -> MotionFit:
     """Everything anew from the offset of a branch."""
     rows = ready.observations.reference_row - ready.anchor.reference_row
     offset = float(best.theta[1] - rows * (best.theta[4] - best.theta[3]))
     near = replace(ready.anchor, right_offset_s=offset, right_offset_sigma_s=NEAR_S)
-    fit = fit_motion(ready.observations, ready.rig, near, ready.settings, tick)
+    again = prepare(ready.observations, ready.rig, near, ready.settings)
+    fit = _fit_periodic(again, tick, lost)
     timing = replace(fit.timing, offset_slip=not ready.offset_found)
     return replace(fit, anchor=ready.anchor, timing=timing)
 
@@ -153,10 +161,18 @@ def table_of(ready: Prepared, weighed: br.Weighed, chi2: float) -> BranchTable:
 
 
 def finished(
-    ready: Prepared, fitted: tuple[Model, Branch], weighed: br.Weighed, kind: str, fast: float
+    ready: Prepared,
+    fitted: tuple[Model, Branch],
+    weighed: br.Weighed,
+    kind: str,
+    seen: tuple[float, bool],
 ) -> MotionFit:
-    """Motions, covariance, verdict; fast: largest change of the apparent frequency, Hz/s."""
-    model, best = fitted
+    """Motions, covariance, verdict.
+
+    seen: largest change of the apparent frequency, Hz/s, and whether the offset was searched for
+    in vain.
+    """
+    (model, best), (fast, lost) = fitted, seen
     chi2 = chi2_of(model, best)
     table = table_of(ready, weighed, chi2)
     scale = max(1.0, chi2) * ready.pixels.learned
@@ -177,6 +193,7 @@ def finished(
         sigma_mm=strongest.amplitude_sigma()[0, :3],
         fast_hz_s=fast,
         beside=ready.pixels.beside if kind == "steady" else 0.0,
+        offset_lost=lost,
     )
     decision = decide(facts, ready.anchor, ready.settings)
     return _result(ready, model, best, facts, decision, (markers, timing, kind))
