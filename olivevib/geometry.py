@@ -118,8 +118,11 @@ def _distort(x: Floats, y: Floats, distortion: Floats) -> tuple[Floats, Floats, 
     by_xy[:, 0, 1] = x * slope * y + 2 * p1 * x + 2 * p2 * y
     by_xy[:, 1, 0] = by_xy[:, 0, 1]
     by_xy[:, 1, 1] = radial + y * slope * y + 6 * p1 * y + 2 * p2 * x
-    by_k = np.stack([np.stack([x * r2, x * r2**2], -1), np.stack([y * r2, y * r2**2], -1)], axis=1)
-    return np.stack([u, v], axis=-1), by_xy, by_k
+    by_k, distorted = np.empty((x.size, 2, 2)), np.empty((x.size, 2))
+    by_k[:, 0, 0], by_k[:, 1, 0] = x * r2, y * r2
+    by_k[:, :, 1] = by_k[:, :, 0] * r2[:, None]
+    distorted[:, 0], distorted[:, 1] = u, v
+    return distorted, by_xy, by_k
 
 
 @dataclass(frozen=True)
@@ -211,10 +214,11 @@ def vector_from_rotation(R: ArrayLike) -> Floats:
 
 def skew(v: ArrayLike) -> Floats:
     """The matrices (..., 3, 3) with skew(v) @ w = v x w."""
-    x, y, z = np.moveaxis(np.asarray(v, dtype=np.float64), -1, 0)
-    zero = np.zeros_like(x)
-    rows = [np.stack(r, -1) for r in ((zero, -z, y), (z, zero, -x), (-y, x, zero))]
-    return np.stack(rows, axis=-2)
+    w = np.asarray(v, dtype=np.float64)
+    out = np.zeros((*w.shape[:-1], 3, 3))
+    out[..., 2, 1], out[..., 0, 2], out[..., 1, 0] = w[..., 0], w[..., 1], w[..., 2]
+    out[..., 1, 2], out[..., 2, 0], out[..., 0, 1] = -w[..., 0], -w[..., 1], -w[..., 2]
+    return out
 
 
 def nearest_rotation(M: ArrayLike) -> Floats:

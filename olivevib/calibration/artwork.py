@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Floats, Ints
-from olivevib.calibration.boards import Board, markers_on, predefined
+from olivevib.calibration.boards import Board, markers_on, own_codes, predefined
 
 Image = NDArray[np.float32]
 CELL_PX = 160  # template pixels a square, or a marker with its gap; fewer on large boards
@@ -65,16 +65,21 @@ def blurred_squares(squares: Floats, size_px: Ints, sigma_px: float) -> Image:
     """
     from scipy.special import ndtr
 
-    sides = []
+    sides, which = [], []
     for k, n in enumerate(size_px):
+        spans, of = np.unique(np.round(squares[:, k::2], 6), axis=0, return_inverse=True)
         centre = np.arange(n) + 0.5
-        low, high = ((centre - squares[:, j, None]) / sigma_px for j in (k, k + 2))
+        low, high = ((centre - spans[:, j, None]) / sigma_px for j in (0, 1))
         bell = np.exp(-0.5 * low**2) - np.exp(-0.5 * high**2)
         shade, slope = ndtr(low) - ndtr(high), bell / (np.sqrt(2 * np.pi) * sigma_px)
         sides.append((shade.astype(np.float32), slope.astype(np.float32)))
+        which.append(of.ravel())
     (across, slope_x), (down, slope_y) = sides
-    layers = [down.T @ across, down.T @ slope_x, slope_y.T @ across]
-    return np.asarray(np.stack(layers, axis=2), dtype=np.float32)
+    printed = np.zeros((len(down), len(across)), np.float32)  # squares share few columns and rows
+    np.add.at(printed, (which[1], which[0]), 1)
+    rows = printed @ across
+    layers = [down.T @ rows, down.T @ (printed @ slope_x), slope_y.T @ rows]
+    return np.asarray(cv2.merge(layers), dtype=np.float32)
 
 
 def _reach(board: Board) -> Floats:
@@ -84,10 +89,8 @@ def _reach(board: Board) -> Floats:
 
 def charuco_board(board: Board) -> cv2.aruco.CharucoBoard:
     """OpenCV's board of the same description."""
-    lengths = board.lengths_mm
-    book = predefined(board.dictionary)
-    shape = (board.columns, board.rows)
-    made = cv2.aruco.CharucoBoard(shape, lengths["square"], lengths["marker"], book)
+    lengths, shape = board.lengths_mm, (board.columns, board.rows)
+    made = cv2.aruco.CharucoBoard(shape, lengths["square"], lengths["marker"], own_codes(board))
     made.setLegacyPattern(board.legacy)
     return made
 

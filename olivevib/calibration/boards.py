@@ -278,3 +278,11 @@ def _nearest(word: str, known: Mapping[str, object] | tuple[str, ...]) -> str:
 def predefined(name: str) -> cv2.aruco.Dictionary:
     """OpenCV's dictionary of that name."""
     return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+
+
+def own_codes(board: Board) -> cv2.aruco.Dictionary:
+    """The codes of its markers alone: a thousand others need not be compared with each square."""
+    book = predefined(board.dictionary)
+    count = markers_on(board.kind, board.columns, board.rows)
+    own = np.ascontiguousarray(book.bytesList[:count])
+    return cv2.aruco.Dictionary(own, book.markerSize, book.maxCorrectionBits)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from olivevib.arrays import Floats, Grey, Ints
 from olivevib.calibration.artwork import Artwork, charuco_board
-from olivevib.calibration.boards import CORNERS_PER_MARKER, Board, markers_on, predefined
+from olivevib.calibration.boards import CORNERS_PER_MARKER, Board, markers_on, own_codes
 from olivevib.calibration.corners import refine
 from olivevib.calibration.views import BoardView
 from olivevib.calibration.warp import bent_warp, robust_homography
@@ -126,15 +126,15 @@ def _charuco_search(board: Board) -> Callable[[Grey], Raw | None]:
     return search
 
 
-def aruco_detector(dictionary: str) -> cv2.aruco.ArucoDetector:
-    """OpenCV's marker detector with corners from fitted contours."""
+def aruco_detector(board: Board) -> cv2.aruco.ArucoDetector:
+    """OpenCV's detector of a board's markers with corners from fitted contours."""
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
-    return cv2.aruco.ArucoDetector(predefined(dictionary), parameters)
+    return cv2.aruco.ArucoDetector(own_codes(board), parameters)
 
 
 def _arucogrid_search(board: Board) -> Callable[[Grey], Raw | None]:
-    detector = aruco_detector(board.dictionary)
+    detector = aruco_detector(board)
     count = markers_on(board.kind, board.columns, board.rows)
 
     def search(grey: Grey) -> Raw | None:
