@@ -3,8 +3,11 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# byte code is made of what is imported, by whoever imports it first: a third of the time of an install
-PIP = $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check
+PIP = $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# every process of the tests would compile the package anew
+unexport PYTHONDONTWRITEBYTECODE
+# on two cores: while one waits for a camera, a kill or the app, another computes
+TOGETHER = -n 3 --dist worksteal
 
 .PHONY: help demo test check lint sample requirements clean
 
@@ -28,7 +31,7 @@ demo: $(VENV)/ready
 	$(BIN)/olivevib demo || [ $$? -eq 3 ]
 
 test: $(VENV)/ready
-	$(BIN)/pytest -m "not slow" -n 2 --dist worksteal
+	$(BIN)/pytest -m "not slow" $(TOGETHER)
 
 lint: $(VENV)/ready
 	$(BIN)/ruff check .
@@ -42,7 +45,7 @@ $(VENV)/ready-check: $(VENV)/ready requirements-check.txt
 
 check: $(VENV)/ready  # the extras are fetched while one core lints: what lint reads does not change by them
 	$(MAKE) -j2 $(VENV)/ready-check lint
-	$(BIN)/pytest -n 2 --dist worksteal
+	$(BIN)/pytest $(TOGETHER)
 
 sample: $(VENV)/ready
 	rm -rf trials/sample trials/sample-truth
