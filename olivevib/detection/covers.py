@@ -15,7 +15,7 @@ import numpy as np
 from olivevib.arrays import Bools, Grey
 from olivevib.detection.card_fit import CardFit
 from olivevib.detection.pixels import Pixels, Singles, marker_pixels
-from olivevib.detection.refine import CLEAR, fit_template, weights_in_place
+from olivevib.detection.refine import CLEAR, fit_template, only, weights_in_place
 from olivevib.detection.template import draw_template, module_px
 from olivevib.marker import MarkerLayout
 
@@ -45,20 +45,6 @@ def without_cover(grey: Grey, white: Singles, one: CardFit, layout: MarkerLayout
         return one
     kept = replace(again, weight=one.fit.weight, cells=one.fit.cells, whole_ncc=one.fit.whole_ncc)
     return replace(one, fit=kept)
-
-
-def only(pixels: Pixels, keep: Bools) -> Pixels:
-    """The pixels ``keep`` (N,) alone."""
-    return replace(
-        pixels,
-        X=pixels.X[keep],
-        Y=pixels.Y[keep],
-        level=pixels.level[keep],
-        x=pixels.x[keep],
-        y=pixels.y[keep],
-        cell=pixels.cell[keep],
-        trust=pixels.trust[keep],
-    )
 
 
 def _believed(pixels: Pixels, weights: Singles, side_px: float) -> Bools:

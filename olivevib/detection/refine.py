@@ -6,11 +6,11 @@ covered modules out. See knowledge: the template model, its covariance.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from olivevib.arrays import Floats
+from olivevib.arrays import Bools, Floats
 from olivevib.detection.fitted_points import image_homography
 from olivevib.detection.model import (
     Unknowns,
@@ -28,6 +28,7 @@ from olivevib.detection.template import Template
 LEAST_GAIN = 4.0  # grey levels between dark and white
 CLEAR = 0.5  # weight above which a pixel counts as not covered
 MOVED_PX = 0.02  # a pass that moves no cornerstone farther is the last: the next is quadratic
+ROUGH_PX = 0.1  # the same of a first, coarse fit
 PASSES = 8
 ENOUGH = 500  # residuals that give the scale of the weights
 LIGHT_ROUNDS = 6  # of robust weights and light in turn
@@ -86,7 +87,7 @@ def approach(
 
     Lost is what correlates with the image on the whole marker by less than ``least_ncc``.
     """
-    end = _settle(template, pixels)
+    end = _settle(template, pixels, ROUGH_PX)
     if end is None:
         return None
     if _correlation(end.T, pixels.level) < least_ncc:
@@ -154,8 +155,8 @@ def weights_in_place(template: Template, pixels: Pixels) -> Singles:
     return weight
 
 
-def _settle(template: Template, pixels: Pixels) -> _Settled | None:
-    """Gauss-Newton with Tukey weights from the second pass on."""
+def _settle(template: Template, pixels: Pixels, enough_px: float = MOVED_PX) -> _Settled | None:
+    """Gauss-Newton until no cornerstone moves by ``enough_px``; Tukey weights from pass two on."""
     state = Unknowns.of(template, pixels.scale)
     reads = read_texture(template, pixels, state.W)
     weight = np.ones_like(pixels.X)
@@ -176,11 +177,25 @@ def _settle(template: Template, pixels: Pixels) -> _Settled | None:
         if not (np.isfinite(change).all() and state.light[3] > LEAST_GAIN):
             return None
         reads = read_texture(template, pixels, state.W)
-        if step and np.abs(change[:8]).max() * pixels.scale < MOVED_PX:
+        if step and np.abs(change[:8]).max() * pixels.scale < enough_px:
             converged = True
             break
-    J, residual = linearised(pixels, reads, state)
+    residual -= change.astype(np.float32) @ J
     return _Settled(state, J, drawn_level(pixels, reads, state), residual, weight, converged)
+
+
+def only(pixels: Pixels, keep: Bools) -> Pixels:
+    """The pixels ``keep`` (N,) alone."""
+    return replace(
+        pixels,
+        X=pixels.X[keep],
+        Y=pixels.Y[keep],
+        level=pixels.level[keep],
+        x=pixels.x[keep],
+        y=pixels.y[keep],
+        cell=pixels.cell[keep],
+        trust=pixels.trust[keep],
+    )
 
 
 def _tukey(residual: Singles, gain: float) -> Singles:

@@ -6,6 +6,7 @@ the best agreement wins. Source: knowledge, soft decoding.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -74,14 +75,15 @@ class SoftReader:
         assert best is not None
         return best
 
-    def _references(self, levels: Floats) -> list[tuple[Floats, Floats]]:
+    def _references(self, levels: Floats) -> Iterator[tuple[Floats, Floats]]:
         """Dark and white level of each module (N, n²) or (N, 1), in four ways."""
         bars, white = levels[:, self._bars], levels[:, self._white]
-        medians = [np.median(x, axis=1, keepdims=True) for x in (bars, white)]
-        planes = [levels[:, at] @ through for through, at in self._planes]
+        yield np.median(bars, axis=1, keepdims=True), np.median(white, axis=1, keepdims=True)
+        dark, bright = (levels[:, at] @ through for through, at in self._planes)
+        yield dark, bright
         area = levels[:, self._area]
-        extremes = (area.min(axis=1, keepdims=True), area.max(axis=1, keepdims=True))
-        return [(medians[0], medians[1]), (planes[0], planes[1]), extremes, self._local(levels)]
+        yield area.min(axis=1, keepdims=True), area.max(axis=1, keepdims=True)
+        yield self._local(levels)
 
     def _local(self, levels: Floats) -> tuple[Floats, Floats]:
         """White as a closing over the modules shows it: it follows the edge of a shadow."""
