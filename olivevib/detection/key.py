@@ -13,13 +13,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from olivevib.arrays import Floats
+from olivevib.arrays import Bools, Floats
 from olivevib.detection.noise import LAGS
-from olivevib.detection.pixels import Singles, marker_pixels
+from olivevib.detection.pixels import Pixels, Singles, marker_pixels
+from olivevib.detection.refine import only
 from olivevib.detection.search import Patch, patch_of
 from olivevib.detection.template import REACH, Blur, Template, draw_template, module_px
 from olivevib.marker import MarkerLayout
 
+FLAT = 0.02  # of the steepest slope, squared: 1.5 px from an edge
 GEOMETRY, LIGHT = 8, 6  # unknowns of the homography and of the light; one more for the blur
 
 
@@ -27,9 +29,10 @@ GEOMETRY, LIGHT = 8, 6  # unknowns of the homography and of the light; one more 
 class Key:
     """One marker drawn at a key pose.
 
-    template: texture with pose and blur; x, y (N,): its pixels there; X, Y (N,): the same about
-    ``centre`` (2,) px in units of ``scale`` px; coarse (Q,): a quarter of them; cells (9, N): row k
-    averages over the k-th ninth; patch to search with; spread (15, 15): sum of J R J' for unit
+    template: texture with pose and blur; x, y (N,): its pixels there, along edges each, on even
+    ground a quarter; area (N,): pixels that each stands for; X, Y (N,): the same about ``centre``
+    (2,) px in units of ``scale`` px; coarse (Q,): a quarter of all; cells (9, N): row k averages
+    over the k-th ninth; patch to search with; spread (15, 15): sum of J R J' for unit
     contrast, R the correlation of the pixels' noise; None where it is white.
     """
 
@@ -38,6 +41,7 @@ class Key:
     y: NDArray[np.intp]
     X: Singles
     Y: Singles
+    area: Singles
     centre: Floats
     scale: float
     coarse: NDArray[np.intp]
@@ -69,16 +73,32 @@ def make_key(
     if pixels is None:
         return None
     template = draw_template(white, H, blur, layout.quiet)
-    counts = np.maximum(np.bincount(pixels.cell, minlength=9), 1)
-    cells = (pixels.cell == np.arange(9)[:, None]) / counts[:, None]
+    keep, area = _telling(template, pixels)
+    pixels = only(pixels, keep)
+    cells = area * (pixels.cell == np.arange(9)[:, None])
+    cells /= np.maximum(cells.sum(axis=1, keepdims=True), 1)
     white_noise = np.count_nonzero(noise) == 1
     spread = None if white_noise else _spread(template, pixels.X, pixels.Y, pixels.x, pixels.y,
                                               pixels.scale, noise)  # fmt: skip
     return Key(
-        template, pixels.x, pixels.y, pixels.X, pixels.Y, pixels.centre, pixels.scale,
+        template, pixels.x, pixels.y, pixels.X, pixels.Y, area, pixels.centre, pixels.scale,
         np.flatnonzero((pixels.x % 2 == 0) & (pixels.y % 2 == 0)), cells.astype(np.float32),
         patch_of(template, layout), spread,
     )  # fmt: skip
+
+
+def _telling(template: Template, pixels: Pixels) -> tuple[Bools, Singles]:
+    """Which pixels (N,) to fit, and of these (K,) how many pixels each stands for.
+
+    Where the drawing is flat a pixel tells of the light only: a quarter of those is enough.
+    """
+    at = (np.stack([pixels.y, pixels.x]) - template.origin_px[::-1, None]) * template.samples
+    j, i = at.astype(int)
+    slope2 = (template.texture[j, i, 1:3] ** 2).sum(axis=1)
+    flat = slope2 < FLAT * slope2.max()
+    keep: Bools = ~flat | ((pixels.x % 2 == 0) & (pixels.y % 2 == 0))
+    share = max(float(flat.sum()), 1.0) / max(float((flat & keep).sum()), 1.0)
+    return keep, np.where(flat[keep], share, 1.0).astype(np.float32)
 
 
 def _spread(

@@ -75,13 +75,14 @@ class _Stack:
     def __init__(self, parts: Sequence[tuple[Key, NDArray[np.intp]]]) -> None:
         n, m = max(at.size for _, at in parts), len(parts)
         self.x, self.y = np.zeros((m, n), np.intp), np.zeros((m, n), np.intp)
-        self.X, self.Y, self.used = (np.zeros((m, n), np.float32) for _ in range(3))
+        self.X, self.Y, self.used, self.area = (np.zeros((m, n), np.float32) for _ in range(4))
         for k, (key, at) in enumerate(parts):
             size = at.size
             self.x[k, :size], self.y[k, :size] = key.x[at], key.y[at]
             self.x[k, size:], self.y[k, size:] = key.x[0], key.y[0]
             self.X[k, :size], self.Y[k, :size] = key.X[at], key.Y[at]
             self.used[k, :size] = 1
+            self.area[k, :size] = key.area[at]
         self.count = self.used.sum(axis=1)
         keys = [key for key, _ in parts]
         self.textures = [key.template.texture for key in keys]
@@ -153,7 +154,7 @@ def _fit_batch(grey: Grey, batch: KeyBatch, shifts: Shifts, W: Floats) -> KeyFit
 class _Pass:
     """One linearised system of each marker and the change (M, 15) that follows.
 
-    J (M, 15, N): Jacobian times the root of the weights; residual, weight (M, N).
+    J (M, 15, N): Jacobian; residual, weight (M, N).
     """
 
     def __init__(
@@ -172,13 +173,12 @@ class _Pass:
         self.weight = stack.used
         if robust:
             self.weight = stack.used * _tukey(self.residual, state.light[:, 3], stack)
-        root = np.sqrt(self.weight)
-        self.J *= root[:, None]
-        A = np.stack([J @ J.T for J in self.J]).astype(np.float64)
+        WJ = self.J * self.weight[:, None]
+        A = (WJ @ self.J.transpose(0, 2, 1)).astype(np.float64)
         A[:, np.arange(UNKNOWNS), np.arange(UNKNOWNS)] *= 1 + 1e-7
         A[:, np.arange(UNKNOWNS), np.arange(UNKNOWNS)] += 1e-9
         self.A = A
-        b = (self.J @ (root * self.residual)[:, :, None]).astype(np.float64)
+        b = (WJ @ self.residual[:, :, None]).astype(np.float64)
         self.change: Floats = np.linalg.solve(A, b)[:, :, 0]
 
 
@@ -252,13 +252,13 @@ def _add(state: _State, change: Floats) -> None:
 
 
 def _result(batch: KeyBatch, level: Singles, state: _State, last: _Pass, settled: Bools) -> KeyFits:
-    used, count = batch.full.used, batch.full.count
+    area = batch.full.area
+    total = area.sum(axis=1)
     change = last.change.astype(np.float32)[:, None]
-    clear = (last.weight > CLEAR).astype(np.float32)
-    root = np.sqrt(np.maximum(last.weight, CLEAR))
-    residual = (last.residual - (change @ last.J)[:, 0] / root) * used
+    clear = (last.weight > CLEAR) * area
+    residual = last.residual - (change @ last.J)[:, 0]
     freedom = np.maximum(clear.sum(axis=1) - UNKNOWNS, 1)
-    rms = np.sqrt(((residual * clear) ** 2).sum(axis=1) / freedom).astype(np.float64)
+    rms = np.sqrt((residual * residual * clear).sum(axis=1) / freedom).astype(np.float64)
     good = settled & np.isfinite(state.W).all(axis=(1, 2)) & (state.light[:, 3] > LEAST_GAIN)
     inverse = np.linalg.inv(np.where(good[:, None, None], last.A, np.eye(UNKNOWNS)))
     return KeyFits(
@@ -272,9 +272,9 @@ def _result(batch: KeyBatch, level: Singles, state: _State, last: _Pass, settled
         gain=state.light[:, 3],
         rms=rms,
         further=state.further,
-        weight=(last.weight.sum(axis=1) / count).astype(np.float64),
+        weight=((last.weight * area).sum(axis=1) / total).astype(np.float64),
         cell=(batch.cells @ last.weight[:, :, None])[:, :, 0].min(axis=1).astype(np.float64),
-        ncc=_correlation(last.T, level, used, count),
+        ncc=_correlation(last.T, level, area, total),
         converged=good,
     )
 
@@ -291,9 +291,10 @@ def _covariance(key: Key, inverse: Floats, gain: float, rms: float) -> Floats:
     return C
 
 
-def _correlation(T: Singles, level: Singles, used: Singles, count: Singles) -> Floats:
-    a = (T - ((T * used).sum(axis=1) / count)[:, None]) * used
-    b = (level - ((level * used).sum(axis=1) / count)[:, None]) * used
-    scale = np.sqrt((a * a).sum(axis=1) * (b * b).sum(axis=1))
-    out: Floats = ((a * b).sum(axis=1) / np.maximum(scale, 1e-9)).astype(np.float64)
+def _correlation(T: Singles, level: Singles, area: Singles, total: Singles) -> Floats:
+    a = T - ((T * area).sum(axis=1) / total)[:, None]
+    b = level - ((level * area).sum(axis=1) / total)[:, None]
+    wa = a * area
+    scale = np.sqrt((wa * a).sum(axis=1) * (b * b * area).sum(axis=1))
+    out: Floats = ((wa * b).sum(axis=1) / np.maximum(scale, 1e-9)).astype(np.float64)
     return out
