@@ -13,6 +13,7 @@ from olivevib.errors import Caution, InputError
 from olivevib.files.store import write_stage
 from olivevib.geometry import StereoRig
 from olivevib.pipeline.fitted import fitted_samples, with_lines
+from olivevib.pipeline.fitted_response import with_fitted_responses
 from olivevib.pipeline.libraries import corners_mm, pattern_of, trial_library
 from olivevib.pipeline.motions import marker_motion, surveyed
 from olivevib.pipeline.rig_in_use import chosen_world, rig_trust
@@ -246,6 +247,9 @@ def analyse(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
         result = with_lines(result, fit)
     if reconstruction.clock.source == "unknown" and not facts.direct:
         result = _unproven(result)
-    result = replace(result, survey=surveyed(trial, trajectory, motion, result, facts, tick))
+    survey = surveyed(trial, trajectory, motion, result, facts, tick)
+    if fit is not None and decided(fit):
+        survey = with_fitted_responses(survey, fit)
+    result = replace(result, survey=survey)
     write_stage(trial.folder / "vibration.h5", vibration_file(result, now))
     return result.cautions

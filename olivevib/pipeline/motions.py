@@ -16,12 +16,10 @@ from olivevib.trial.settings import Motion
 from olivevib.vibration import (
     Attitude,
     LineSettings,
-    MarkerResponse,
     NamedMotion,
     Phase,
     SamplingFacts,
     Survey,
-    Transmission,
     Vibration,
     VibrationSettings,
     analyse,
@@ -118,20 +116,11 @@ def surveyed(
     reference = wanted if wanted is not None else next(iter(trunk), None)
     turned = attitudes(trajectory)
     found = survey(motion, turned, lines, result.phases, shown, facts, reference, tick)
-    if trajectory.method == "continuous":  # fitted motions cohere because they were fitted
-        found = replace(found, transmissions=tuple(_unweighed(t) for t in found.transmissions))
     asked = [
         _asked(k, m, trajectory, motion, facts, shown)
         for k, m in enumerate(settings.vibration.motion)
     ]
     return replace(found, motions=tuple(asked))
-
-
-def _unweighed(of: Transmission) -> Transmission:
-    """The line's ratio alone: no coherence, no response over frequency."""
-    none = np.empty((0, 3))
-    curve = MarkerResponse(np.empty(0), none.astype(np.complex128), none, none, 0)
-    return replace(of, coherence=np.full(3, np.nan), curve=curve)
 
 
 def _asked(

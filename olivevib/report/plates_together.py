@@ -14,9 +14,21 @@ TURNED = 4  # markers whose rotation is drawn
 
 
 def response_jobs(content: ReportContent) -> Iterator[Job]:
-    """H1 with phase and coherence of the markers that follow the reference best."""
+    """H1 with phase and coherence of the markers that follow the reference best.
+
+    Of motions that were fitted: size and phase of the fitted ratio, at the lines.
+    """
     survey = content.survey
-    found = figures.shown_responses(survey.transmissions) if survey is not None else []
+    all_of_them = survey.transmissions if survey is not None else ()
+    at_lines = figures.at_lines(all_of_them)
+    if at_lines:
+        caption = _AT_LINES.format(reference=at_lines[0].reference)
+        yield (
+            "transmissibility",
+            caption,
+            partial(figures.line_responses, at_lines, content.names()),
+        )
+    found = figures.shown_responses(all_of_them)
     if found:
         segments = min(t.curve.segments for t in found)
         caption = _RESPONSE.format(reference=found[0].reference, segments=segments,
@@ -41,6 +53,12 @@ _RESPONSE = (
     "Response of each marker to marker {reference} over the whole trial, axis by axis: size and"
     " phase of H1, and coherence. Thin grey: coherence below 0.8, not to be trusted; noise alone"
     " gives {noise} ({segments} segments). Frequencies are as sampled."
+)
+_AT_LINES = (
+    "Response of each marker to marker {reference} at the lines of the fitted motion, axis by axis:"
+    " ratio of the fitted complex amplitudes, size and phase. Bars: one standard deviation of the"
+    " fit, times and frequency included. Nothing stands between the lines, and there is no"
+    " coherence: fitted motions cohere because they were fitted."
 )
 _SHAPE = (
     "The shape in which the markers move at their common line. Square: mean place; ellipse: the"

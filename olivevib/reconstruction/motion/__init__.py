@@ -3,6 +3,7 @@
 from olivevib.reconstruction.motion.drawing import Pattern
 from olivevib.reconstruction.motion.fit import fit_motion
 from olivevib.reconstruction.motion.observe import observe
+from olivevib.reconstruction.motion.ratio import FittedRatio, fitted_ratio
 from olivevib.reconstruction.motion.sightings import MarkerSightings, Observations, Sightings
 from olivevib.reconstruction.motion.types import (
     Anchor,
@@ -17,6 +18,7 @@ from olivevib.reconstruction.motion.types import (
 __all__ = [
     "Anchor",
     "BranchTable",
+    "FittedRatio",
     "MarkerMotion",
     "MarkerSightings",
     "Motion",
@@ -27,5 +29,6 @@ __all__ = [
     "Sightings",
     "Timing",
     "fit_motion",
+    "fitted_ratio",
     "observe",
 ]

@@ -7,6 +7,7 @@ from olivevib.report.figures.canvas import style
 from olivevib.report.figures.decays import decays
 from olivevib.report.figures.distances import Distance, distances, pair_distances
 from olivevib.report.figures.frequency import frequencies
+from olivevib.report.figures.line_response import at_lines, line_responses
 from olivevib.report.figures.motion import Window, close_window, time_series, whole
 from olivevib.report.figures.orbits import MOST_ACROSS, orbit_reach_mm, orbits
 from olivevib.report.figures.residuals import holdout, residual_map
@@ -33,6 +34,7 @@ __all__ = [
     "Spectrogram",
     "Window",
     "amplitude_spectra",
+    "at_lines",
     "boxes",
     "close_window",
     "decays",
@@ -40,6 +42,7 @@ __all__ = [
     "distances",
     "frequencies",
     "holdout",
+    "line_responses",
     "orbit_reach_mm",
     "orbits",
     "overlay",
