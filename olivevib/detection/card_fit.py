@@ -23,7 +23,8 @@ from olivevib.detection.uneven import closed_light, template_light
 from olivevib.geometry import apply_homography
 from olivevib.marker import MarkerLayout
 
-REDRAWN_PX2 = 0.12  # change of the blur that asks for a new drawing
+REDRAWN_PX2 = 0.12  # change of the blur that asks for a new drawing of what moves or is followed
+SETTLED_PX2 = 0.05  # and of a still marker that is fitted by itself
 COARSE_PX = 15.0  # centre to corner for each pixel of stride in the first fit
 EVEN = 0.05  # rms over gain of a marker in even light, covered parts left out
 EVENED_NCC = 0.6  # correlation that a coarse fit must have once the light is even
@@ -31,7 +32,7 @@ BETTER = 0.7  # of that rms: what evening out the light must achieve to be belie
 ROUNDS = 3  # of light and fit in turn
 UNEVEN_VARIANCE = 2.5  # covariance of fits in uneven light, times; set on rendered shadows
 MOVING_PX2 = 0.9  # variance of the blur from which a motion is looked for
-DRAWN = (2, 10)  # drawings at most: of a still marker, of one that moved
+DRAWN = (3, 10)  # drawings at most: of a still marker, of one that moved
 LONGER = (1.0, 1.7)  # starts: of the path that the blur's moments show
 REDRAWN_PATH_PX = 0.3  # change of a path that asks for a new drawing
 REDRAWN_SHAPE_PX = 0.3  # at the corners, of a marker that moved
@@ -102,7 +103,7 @@ def _fine(
 
 def _settled(fit: Fit) -> bool:
     """Whether blur and, of what moves, path and shape were drawn as the fit found them."""
-    if abs(fit.further[0]) >= REDRAWN_PX2:
+    if abs(fit.further[0]) >= (REDRAWN_PX2 if fit.further.size == 3 else SETTLED_PX2):
         return False
     path = float(np.hypot(*fit.further[1:])) if fit.further.size == 3 else 0.0
     turned = fit.to_template[:, :2] - np.eye(3)[:, :2]

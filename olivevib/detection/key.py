@@ -18,7 +18,14 @@ from olivevib.detection.noise import LAGS
 from olivevib.detection.pixels import Pixels, Singles, marker_pixels
 from olivevib.detection.refine import only
 from olivevib.detection.search import Patch, patch_of
-from olivevib.detection.template import REACH, Blur, Template, draw_template, module_px
+from olivevib.detection.template import (
+    FOLLOWED,
+    REACH,
+    Blur,
+    Template,
+    draw_template,
+    module_px,
+)
 from olivevib.marker import MarkerLayout
 
 FLAT = 0.02  # of the steepest slope, squared: 1.5 px from an edge
@@ -72,7 +79,7 @@ def make_key(
     pixels = marker_pixels(blank, H, layout.modules, reach_modules=reach)
     if pixels is None:
         return None
-    template = draw_template(white, H, blur, layout.quiet)
+    template = draw_template(white, H, blur, layout.quiet, FOLLOWED)
     keep, area = _telling(template, pixels)
     pixels = only(pixels, keep)
     cells = area * (pixels.cell == np.arange(9)[:, None])

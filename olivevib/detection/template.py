@@ -1,8 +1,14 @@
 """A marker drawn as a camera sees it: the template that refinement fits to the image.
 
-The pattern is drawn once at a start pose as a texture of SAMPLES per pixel, blurred by the point
+The pattern is drawn once at a start pose as a texture of some samples a pixel, blurred by the point
 spread and the pixel; its derivatives are textures too. Near the start pose the image of the marker
 is this texture seen through a homography close to the identity.
+
+A sharp edge read at points lies between two of them, up to half a sample wrong and, along the pixel
+axes, all of it alike. So the pattern is smooth before it is read: each module edge is a Gaussian
+step of SMOOTH samples across, exact in the plane of the marker, which leaves exp(-2 pi² SMOOTH²) of
+that error (sampling theorem). The pixel is its own box, which whole pixels read without error at
+any point spread; the Gaussian between the two makes up the rest of the variance.
 """
 
 from __future__ import annotations
@@ -12,19 +18,22 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from olivevib.arrays import Bools, Floats
 from olivevib.detection.bend import Bend, bent_maps
 from olivevib.geometry import apply_homography, homography_jacobian
 
-FINE, COARSE = 4, 2  # texture samples a pixel: to measure with, to approach with
+FINE, COARSE = 3, 2  # texture samples a pixel: to measure with, to approach with
+FOLLOWED = 4  # the same of a drawing that is read anywhere between its samples
 PIXEL_VARIANCE = 1 / 12  # px² of a pixel's own area, as a Gaussian
-LEAST_BLUR = 0.3  # texture samples; sharper cannot be drawn
+SMOOTH = 0.7  # samples: sigma of an edge before it is read
+DENSER = 2  # the card's own samples a texture sample, where it is to measure with
+TAIL = 3.5  # sigmas of a Gaussian that are drawn
+THREE_TAPS = 0.5  # variance, samples², up to which a Gaussian is three taps
 REACH = 0.6  # modules around the dark square that are drawn
-MARGIN_PX = 4.0  # and px around these; beyond them the edge is repeated
+MARGIN_PX = 2.0  # and px around these; beyond them the edge is repeated
 LARGE_PX = 20.0  # side of a module from which the coarse drawing is fine enough
-SMALL_PX = 3.2  # side of a module below which FINE would leave a bias of 0.001 px
-FINENESS = (4, 8, 16, 32)  # drawn samples a module
 LEAST_PATH_PX = 0.5  # a shorter motion is part of the round blur
 PATH_POINTS = 512  # of a motion path
 
@@ -85,25 +94,23 @@ def draw_template(
 
     With a ``bend`` it lies on a cylinder, and H is the pose of the plane that touches its middle.
 
-    Degenerates for a variance below 0.1 px²: the texture's own sampling is then the blur.
+    Degenerates for a variance below 0.16 px²: the texture's own sampling is then the blur.
     """
+    denser = 1 if samples == COARSE else DENSER
     if module_px(H) >= LARGE_PX:
         samples = COARSE
-    elif module_px(H) < SMALL_PX and samples == FINE:
-        samples = 2 * FINE
     half = len(white) / 2
     reach = half - quiet + REACH
     box = apply_homography(H, [[-reach, -reach], [reach, -reach], [reach, reach], [-reach, reach]])
     origin = np.floor(box.min(axis=0) - MARGIN_PX)
     width, height = (np.ceil(box.max(axis=0) + MARGIN_PX) - origin).astype(int) * samples + 1
-    side_px = module_px(H)
-    fine = min(FINENESS, key=lambda m: abs(np.log(m / (0.7 * samples * side_px))))
-    drawn = white.repeat(fine, axis=0).repeat(fine, axis=1)
-    size, first = (int(width), int(height)), fine * half - 0.5
+    density = denser * samples * _across_px(H)
+    drawn, first = _smooth_card(white, quiet, density, denser * SMOOTH)
+    size = (int(width), int(height))
     if bend is None:
         to_image = np.array([[1 / samples, 0, origin[0]], [0, 1 / samples, origin[1]], [0, 0, 1]])
-        to_drawn = np.array([[fine, 0, first], [0, fine, first], [0, 0, 1]])
-        sharp = cv2.warpPerspective(
+        to_drawn = np.array([[density[0], 0, first[0]], [0, density[1], first[1]], [0, 0, 1]])
+        read = cv2.warpPerspective(
             drawn,
             to_drawn @ np.linalg.inv(H) @ to_image,
             size,
@@ -111,25 +118,81 @@ def draw_template(
             borderMode=cv2.BORDER_REPLICATE,
         )
     else:
-        u, v = (fine * part + first for part in bent_maps(bend, H, origin, size, samples))
-        sharp = cv2.remap(drawn, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    own = 1 / (6 * samples**2) + (side_px / fine) ** 2 / 12  # bilinear reads, drawn ramps
-    sigma = samples * float(np.sqrt(max(blur.variance_px2 - own, 0.0)))
-    still = _smoothed(np.asarray(sharp, dtype=np.float32), sigma)
+        maps = bent_maps(bend, H, origin, size, samples)
+        u, v = (
+            np.float32(m) * part + np.float32(c)
+            for m, part, c in zip(density, maps, first, strict=True)
+        )
+        read = cv2.remap(drawn, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    kernel = _pixel_kernel(blur.variance_px2, samples, denser)
+    still = np.asarray(
+        cv2.sepFilter2D(read, cv2.CV_32F, kernel, kernel, borderType=cv2.BORDER_REPLICATE),
+        dtype=np.float32,
+    )
     level = _along(still, blur, samples)
-    parts = [level, _slope(level, 1, 0, samples), _slope(level, 0, 1, samples)]
+    parts = [level, _slope(level, 0, samples), _slope(level, 1, samples)]
     parts += _by_variances(level, samples) if moments else _by_blur(level, still, blur, samples)
     texture = np.asarray(cv2.merge(parts), dtype=np.float32)
     moving = blur.path_px > LEAST_PATH_PX and not moments
     return Template(texture, origin, H, blur, samples, moving)
 
 
-def _smoothed(level: NDArray[np.float32], sigma: float) -> NDArray[np.float32]:
-    if sigma <= LEAST_BLUR:
-        return level
-    size = 2 * int(np.ceil(3 * sigma)) + 1
-    smooth = cv2.GaussianBlur(level, (size, size), sigma, borderType=cv2.BORDER_REPLICATE)
-    return np.asarray(smooth, dtype=np.float32)
+def _across_px(H: Floats) -> Floats:
+    """How wide a module is across its edges u = const and v = const (2,), px, at the centre."""
+    out: Floats = 1 / np.linalg.norm(np.linalg.inv(homography_jacobian(H, [[0.0, 0.0]])[0]), axis=1)
+    return out
+
+
+def _smooth_card(
+    white: NDArray[np.float32], quiet: int, density: Floats, sigma: float
+) -> tuple[NDArray[np.float32], Floats]:
+    """A card with ``density`` (2,) samples a module along u and v, and the sample of its centre.
+
+    Its edges are Gaussian steps of ``sigma`` samples. It ends where all is white.
+    """
+    core = white[quiet - 1 : len(white) - quiet + 1, quiet - 1 : len(white) - quiet + 1]
+    inner = len(core) - 2
+    centre = np.ceil(TAIL * sigma) + density * inner / 2
+    across, down = (
+        _smooth_modules(inner, float(m), float(c), sigma)
+        for m, c in zip(density, centre, strict=True)
+    )
+    return np.asarray(down @ core @ across.T, dtype=np.float32), centre
+
+
+def _smooth_modules(
+    modules: int, density: float, centre: float, sigma: float
+) -> NDArray[np.float32]:
+    """How much each sample (K,) of a row sees of each module, and of the white before and after."""
+    samples = np.arange(int(np.ceil(2 * centre)) + 1)
+    edges = centre + density * (np.arange(modules + 1) - modules / 2)
+    beyond = np.zeros((len(samples), modules + 3), dtype=np.float32)
+    beyond[:, 0] = 1
+    beyond[:, 1:-1] = ndtr(((samples[:, None] - edges) / sigma).astype(np.float32))
+    out: NDArray[np.float32] = beyond[:, :-1] - beyond[:, 1:]
+    return out
+
+
+def _pixel_kernel(variance_px2: float, samples: int, denser: int) -> NDArray[np.float32]:
+    """What blurs a drawing along one axis: the pixel's box, and a Gaussian for the rest.
+
+    Already in the drawing are its smooth edges and the bilinear reads of the card; a coarse drawing
+    is read anywhere between its own samples too, another near them (or its blur is fitted).
+    """
+    taps = samples + 1 - samples % 2
+    box = np.full(taps, 1 / samples)
+    if samples % 2 == 0:
+        box[[0, -1]] /= 2
+    at = np.arange(taps) - taps // 2
+    own = float(box @ at**2) + SMOOTH**2 + 1 / (6 * denser**2) + (1 / 6 if denser == 1 else 0)
+    rest = max(variance_px2 * samples**2 - own, 0.0)
+    if rest < THREE_TAPS:
+        gauss = np.array([rest / 2, 1 - rest, rest / 2])
+    else:
+        sigma = float(np.sqrt(rest))
+        reach = int(np.ceil(TAIL * sigma))
+        gauss = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
+    return np.asarray(np.convolve(box, gauss / gauss.sum()), dtype=np.float32)
 
 
 def _along(still: NDArray[np.float32], blur: Blur, samples: int) -> NDArray[np.float32]:
@@ -162,10 +225,11 @@ def _path_kernel(path: Floats, half: int) -> NDArray[np.float32]:
     return np.asarray(kernel / kernel.sum(), dtype=np.float32)
 
 
-def _slope(level: NDArray[np.float32], dx: int, dy: int, samples: int) -> NDArray[np.float32]:
-    """Central difference along x or y, per px."""
-    slope = cv2.Sobel(level, cv2.CV_32F, dx, dy, ksize=1, scale=0.5 * samples)
-    return np.asarray(slope, dtype=np.float32)
+def _slope(level: NDArray[np.float32], axis: int, samples: int) -> NDArray[np.float32]:
+    """Derivative along x (axis 0) or y, per px, of fourth order."""
+    slope, one = samples / 12 * np.array([1.0, -8.0, 0.0, 8.0, -1.0]), np.array([1.0])
+    kernels = (slope, one) if axis == 0 else (one, slope)
+    return np.asarray(cv2.sepFilter2D(level, cv2.CV_32F, *kernels), dtype=np.float32)
 
 
 def _by_blur(
