@@ -34,10 +34,10 @@ class Artwork:
         self._sign = -1.0 if board.inverted else 1.0
         self._drawn: dict[int, Image] = {}
 
-    def pixels(self, board_mm: Floats) -> Image:
-        """Template pixels (N, 2) of board points (N, 2)."""
-        px = (board_mm - self.corner_mm) * self.px_per_mm - 0.5
-        return np.asarray(px, dtype=np.float32)
+    def pixels(self, board_mm: Image) -> Image:
+        """Template pixels (2, N) of board points (2, N)."""
+        first = (self.corner_mm * self.px_per_mm + 0.5).astype(np.float32)
+        return np.asarray(board_mm * np.float32(self.px_per_mm) - first[:, None], dtype=np.float32)
 
     def clip(self, level: int) -> int:
         """The nearest level of blur that exists."""

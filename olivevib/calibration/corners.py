@@ -19,6 +19,7 @@ import numpy as np
 from olivevib.arrays import Bools, Floats, Grey, Ints
 from olivevib.calibration.artwork import Artwork, Image
 from olivevib.calibration.warp import Warp, bent_warp, sane
+from olivevib.detection.pixels import Singles
 
 FIRST_BLUR_PX = 0.8  # Gaussian blur of a camera to begin with; one is chosen a view
 MOST_PIXELS = 12_000  # of one view; larger patches are cut down, but not below the next
@@ -42,14 +43,17 @@ class Fitted:
 
 @dataclass(frozen=True)
 class _Patches:
-    """Pixels of all patches, sorted by point: index of the point, grey value, board place."""
+    """Pixels of all patches, sorted by point: index of the point, grey value, board place.
+
+    In single precision, which is good to 1e-4 template pixels.
+    """
 
     start: Ints  # (N,) first pixel of each point
     point: Ints
-    grey: Floats
-    board_mm: Floats  # (M, 2) under the homography, before the points move
-    local: Floats  # (M, 2) the same from the middle of the patch, in units of its reach
-    by_px: Floats  # (M, 4) d board / d pixel: xx, xy, yx, yy
+    grey: Singles
+    board_mm: Singles  # (2, M) under the homography, before the points move
+    local: Singles  # (2, M) the same from the middle of the patch, in units of its reach
+    by_px: Singles  # (4, M) d board / d pixel: xx, xy, yx, yy
 
     @property
     def count(self) -> Floats:
@@ -61,12 +65,15 @@ class _Patches:
         point = self.point[::step]
         start = np.searchsorted(point, np.arange(self.start.size))
         rest = (self.grey, self.board_mm, self.local, self.by_px)
-        return _Patches(start, point, *(part[::step] for part in rest))
+        return _Patches(start, point, *(np.ascontiguousarray(p[..., ::step]) for p in rest))
 
-    def sums(self, columns: Floats) -> Floats:
-        """Sums (N, C) over the pixels of each point of ``columns`` (M, C)."""
-        out: Floats = np.add.reduceat(columns, self.start, axis=0)
-        return out
+    def sums(self, rows: Singles) -> Floats:
+        """Sums (..., N) over the pixels of each point of ``rows`` (..., M)."""
+        return np.asarray(np.add.reduceat(rows, self.start, axis=-1), dtype=np.float64)
+
+    def each(self, values: Floats) -> Singles:
+        """Values (N,) of the points at their pixels (M,)."""
+        return np.asarray(values, dtype=np.float32)[self.point]
 
 
 def refine(grey: Grey, artwork: Artwork, board_mm: Floats, px: Floats, reach_mm: Floats) -> Fitted:
@@ -115,7 +122,7 @@ def _round(
     if at.size == 0:
         return lost
     scale = artwork.px_per_mm * np.sqrt(
-        abs(np.linalg.det(patches.by_px.mean(axis=0).reshape(2, 2)))
+        abs(np.linalg.det(patches.by_px.mean(axis=1).reshape(2, 2)))
     )
     found = fit(artwork, patches, float(scale))
     px, sigma, ok = start.px.copy(), np.full(n, np.nan), np.zeros(n, dtype=np.bool_)
@@ -170,25 +177,24 @@ def _joined(parts: list[tuple[Floats, Floats, Floats, Floats]]) -> _Patches:
     counts = [len(part[0]) for part in parts]
     if not parts:
         none = np.zeros(0, dtype=np.int64)
-        return _Patches(
-            none, none, np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 4))
-        )
+        return _Patches(none, none, *(np.zeros((n, 0), np.float32) for n in (0, 2, 2, 4)))
     start = np.cumsum([0, *counts[:-1]])
+    columns = (np.concatenate([part[k] for part in parts]) for k in range(4))
     return _Patches(
         start,
         np.repeat(np.arange(len(parts)), counts),
-        *(np.concatenate([part[k] for part in parts]) for k in range(4)),
+        *(np.ascontiguousarray(part.T, dtype=np.float32) for part in columns),
     )
 
 
-def _sample(layer: Image, px: Image) -> Floats:
-    """Grey value and slopes (M, 3) at template pixels (M, 2), bilinear."""
-    n, width = len(px), 256  # OpenCV takes no list longer than 32767
-    padded = np.zeros((-(-n // width) * width, 2), np.float32)
-    padded[:n] = px
-    x, y = padded[:, 0].reshape(-1, width), padded[:, 1].reshape(-1, width)
+def _sample(layer: Image, px: Singles) -> Singles:
+    """Grey value and slopes (3, M) at template pixels (2, M), bilinear."""
+    n, width = px.shape[1], 256  # OpenCV takes no list longer than 32767
+    padded = np.zeros((2, -(-n // width) * width), np.float32)
+    padded[:, :n] = px
+    x, y = padded.reshape(2, -1, width)
     out = cv2.remap(layer, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(out.reshape(-1, 3)[:n], dtype=np.float64)
+    return np.ascontiguousarray(out.reshape(-1, 3)[:n].T, dtype=np.float32)
 
 
 def _rough(artwork: Artwork, patches: _Patches, scale: float) -> _Descent:
@@ -234,29 +240,29 @@ class _Descent:
         return np.asarray(good & near, dtype=np.bool_)
 
 
-def _drawn(artwork: Artwork, patches: _Patches, layer: Image, move: Floats) -> Floats:
-    """Print and its derivative by the move of the point (M, 3)."""
-    (xx, xy, yx, yy), (mx, my) = patches.by_px.T, move[patches.point].T
-    place = patches.board_mm - np.stack([xx * mx + xy * my, yx * mx + yy * my], axis=1)
+def _drawn(artwork: Artwork, patches: _Patches, layer: Image, move: Floats) -> Singles:
+    """Print and its derivative by the move of the point (3, M)."""
+    xx, xy, yx, yy = patches.by_px
+    mx, my = patches.each(move[:, 0]), patches.each(move[:, 1])
+    place = patches.board_mm - np.stack([xx * mx + xy * my, yx * mx + yy * my])
     drawn = _sample(layer, artwork.pixels(place))
-    tx, ty = -artwork.px_per_mm * drawn[:, 1], -artwork.px_per_mm * drawn[:, 2]
-    drawn[:, 1], drawn[:, 2] = tx * xx + ty * yx, tx * xy + ty * yy
+    tx, ty = np.float32(-artwork.px_per_mm) * drawn[1:]
+    drawn[1], drawn[2] = tx * xx + ty * yx, tx * xy + ty * yy
     return drawn
 
 
-def _light_columns(patches: _Patches, drawn: Floats) -> Floats:
-    """What light makes of a print (M, 6): gain and offset, each a plane over the patch."""
-    T, (x, y) = drawn[:, 0], patches.local.T
-    return np.stack([T, np.ones_like(T), x, y, T * x, T * y], axis=1)
+def _light_rows(patches: _Patches, T: Singles) -> list[Singles]:
+    """What light makes of a print, six rows (M,): gain and offset, each a plane over the patch."""
+    x, y = patches.local
+    return [T, np.ones_like(T), x, y, T * x, T * y]
 
 
-def _per_patch(patches: _Patches, columns: Floats, weight: Floats | None = None) -> Floats:
-    """Gram matrices (N, C, C) of ``columns`` (M, C) over the pixels of each patch."""
-    other = columns if weight is None else columns * weight[:, None]
+def _per_patch(patches: _Patches, rows: Singles, weight: Singles | None = None) -> Floats:
+    """Gram matrices (N, C, C) of ``rows`` (C, M) over the pixels of each patch."""
+    other = rows * (np.float32(1) if weight is None else weight)
     ends = np.append(patches.start, patches.point.size)
-    return np.array([
-        columns[a:b].T @ other[a:b] for a, b in itertools.pairwise(ends)
-    ])  # fmt: skip
+    grams = [rows[:, a:b] @ other[:, a:b].T for a, b in itertools.pairwise(ends)]
+    return np.array(grams, dtype=np.float64)
 
 
 def _firm(matrix: Floats) -> Floats:
@@ -267,30 +273,33 @@ def _firm(matrix: Floats) -> Floats:
     return out
 
 
-def _light(patches: _Patches, drawn: Floats) -> Floats:
+def _light(patches: _Patches, drawn: Singles) -> Floats:
     """The light (N, 6) of each patch by linear least squares."""
-    columns = np.column_stack([_light_columns(patches, drawn), patches.grey])
-    gram = _per_patch(patches, columns)
+    gram = _per_patch(patches, np.stack([*_light_rows(patches, drawn[0]), patches.grey]))
     light = np.linalg.solve(_firm(gram[:, :6, :6]), gram[:, :6, 6:])[:, :, 0]
     return np.asarray(light, dtype=np.float64)
 
 
-def _left_over(patches: _Patches, drawn: Floats, light: Floats) -> Floats:
-    """Grey values (M,) that print and light do not explain."""
-    shown = np.einsum("mi,mi->m", _light_columns(patches, drawn), light[patches.point])
-    out: Floats = patches.grey - shown
-    return out
+def _left_over(patches: _Patches, drawn: Singles, light: Floats) -> tuple[Singles, Singles]:
+    """Grey values (M,) that print and light do not explain, and the light's gain there (M,)."""
+    g, o, ox, oy, gx, gy = light.T
+    x, y = patches.local
+    gain = patches.each(g) + patches.each(gx) * x + patches.each(gy) * y
+    ground = patches.each(o) + patches.each(ox) * x + patches.each(oy) * y
+    out: Singles = patches.grey - ground - gain * drawn[0]
+    return out, gain
 
 
-def _rms(patches: _Patches, residual: Floats) -> Floats:
+def _rms(patches: _Patches, residual: Singles) -> Floats:
     """Rms (N,) of each patch."""
-    return np.asarray(np.sqrt(patches.sums((residual**2)[:, None])[:, 0] / patches.count))
+    return np.asarray(np.sqrt(patches.sums(residual * residual) / patches.count))
 
 
 def _rest(artwork: Artwork, patches: _Patches, layer: Image, move: Floats) -> float:
     """Median over the patches of the residual, rms."""
     drawn = _drawn(artwork, patches, layer, move)
-    return float(np.median(_rms(patches, _left_over(patches, drawn, _light(patches, drawn)))))
+    left = _left_over(patches, drawn, _light(patches, drawn))[0]
+    return float(np.median(_rms(patches, left)))
 
 
 def _descend(
@@ -302,10 +311,11 @@ def _descend(
     for k in range(steps):
         if k:
             drawn = _drawn(artwork, patches, layer, move)
-        residual = _left_over(patches, drawn, light)
+        residual, gain = _left_over(patches, drawn, light)
         limit = np.maximum(0.36 * np.abs(light[:, 0]), 3.9 * _rms(patches, residual))
-        weight = np.clip(1 - (residual / limit[patches.point]) ** 2, 0, None) ** 2
-        gram = _per_patch(patches, _unknowns(patches, drawn, light, residual), weight)
+        weight = np.maximum(1 - (residual * patches.each(1 / limit)) ** 2, 0) ** 2
+        rows = [gain * drawn[1], gain * drawn[2], *_light_rows(patches, drawn[0]), residual]
+        gram = _per_patch(patches, np.stack(rows), weight)
         normal = _firm(gram[:, :8, :8])
         step = np.linalg.solve(normal, gram[:, :8, 8:])[:, :, 0]
         length = np.linalg.norm(step[:, :2], axis=1)
@@ -313,25 +323,17 @@ def _descend(
         light = light + step[:, 2:]
         if length.max() < STILL_PX:
             break
-    total = patches.sums(weight[:, None])[:, 0]
+    total = patches.sums(weight)
     variance = gram[:, 8, 8] / np.maximum(total - 8, 1)
     covariance = np.linalg.inv(normal)[:, :2, :2] * variance[:, None, None]
     sigma = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 2)
-    return _Descent(move, sigma, light[:, 0], _ncc(patches, drawn[:, 0]), length)
+    return _Descent(move, sigma, light[:, 0], _ncc(patches, drawn[0]), length)
 
 
-def _unknowns(patches: _Patches, drawn: Floats, light: Floats, residual: Floats) -> Floats:
-    """Derivatives by move and light (M, 8), then the residual (M, 1)."""
-    x, y = patches.local.T
-    at = light[patches.point]
-    gain = at[:, 0] + at[:, 4] * x + at[:, 5] * y
-    return np.column_stack([gain[:, None] * drawn[:, 1:], _light_columns(patches, drawn), residual])
-
-
-def _ncc(patches: _Patches, drawn: Floats) -> Floats:
+def _ncc(patches: _Patches, drawn: Singles) -> Floats:
     """Size of the correlation (N,) between print and image; an inverted print is one too."""
-    grey = patches.grey
-    columns = np.column_stack([drawn, grey, drawn * drawn, grey * grey, drawn * grey])
-    t, g, tt, gg, tg = (patches.sums(columns) / patches.count[:, None]).T
+    grey = patches.grey - patches.grey.mean()
+    rows = np.stack([drawn, grey, drawn * drawn, grey * grey, drawn * grey])
+    t, g, tt, gg, tg = patches.sums(rows) / patches.count
     spread = np.sqrt(np.maximum((tt - t * t) * (gg - g * g), 1e-18))
     return np.asarray(np.abs(tg - t * g) / spread, dtype=np.float64)
