@@ -92,17 +92,17 @@ def _measured(runs: Runs, area: Floats) -> Domains:
     m = (runs.last - runs.first + 1).astype(np.float64)
     x = 0.5 * (runs.first + runs.last)
     y = runs.y.astype(np.float64)
-    safe = np.maximum(area, 1.0)
+    mx, my = m * x, m * y
+    safe, domain = np.maximum(area, 1.0), runs.domain.astype(np.int64)
 
     def mean(values: Floats) -> Floats:
-        total = np.bincount(runs.domain, values, minlength=area.size)
+        total = np.bincount(domain, values, minlength=area.size)
         return np.asarray(total / safe, dtype=np.float64)
 
-    cx, cy = mean(m * x), mean(m * y)
-    dx, dy = x - cx[runs.domain], y - cy[runs.domain]
-    xx = mean(m * (dx * dx + (m * m - 1) / 12)) + 1 / 12
-    yy = mean(m * dy * dy) + 1 / 12
-    xy = mean(m * dx * dy)
+    cx, cy = mean(mx), mean(my)
+    xx = mean(mx * x + m * (m * m - 1) / 12) - cx * cx + 1 / 12
+    yy = mean(my * y) - cy * cy + 1 / 12
+    xy = mean(mx * y) - cx * cy
     return Domains(area, np.column_stack([cx, cy]), np.column_stack([xx, yy, xy]), runs)
 
 

@@ -78,7 +78,7 @@ def frame_hypotheses(bars: Bars, layout: MarkerLayout) -> Frames:
 
 def _neighbours(bars: Bars) -> tuple[Ints, Ints]:
     """Pairs i < j closer than 1.8 lengths of the longer one."""
-    tree = cKDTree(bars.centre)
+    tree = cKDTree(bars.centre, balanced_tree=False, compact_nodes=False)
     near = tree.query_ball_point(bars.centre, 1.8 * bars.length, return_sorted=False)
     i = np.repeat(np.arange(len(bars)), [len(n) for n in near])
     j = np.fromiter(itertools.chain.from_iterable(near), np.int64, i.size)
@@ -138,7 +138,7 @@ def _support(frames: Frames, bars: Bars, layout: MarkerLayout) -> Ints:
     if len(frames) == 0:
         return frames.support
     half = (layout.modules - 1) / 2
-    tree = cKDTree(bars.centre)
+    tree = cKDTree(bars.centre, balanced_tree=False, compact_nodes=False)
     total = np.zeros(len(frames), np.int64)
     for way, along in ((frames.a, frames.b), (frames.b, frames.a)):
         for sign in (-1, 1):

@@ -38,6 +38,9 @@ CELL = 0.7  # weight of a ninth of the marker below which it is called occluded
 SMALLEST_PX2 = 60.0
 BENT_SIGMA_PX = (0.015, 0.05)  # left on rendered cylinders: radius known, radius estimated
 NEAR_SIZES = 0.25  # of a marker: no second one is looked for so close to one that was found
+READ_AT_ONCE = 2  # of 49 modules that the first frame of a place may have wrong
+MANY_FRAMES = 64
+PLACE_PX = 12.0  # side of a place in which frames are of one marker
 FAR_CODES = 12 / 49  # distance of codes from which the whole drawing tells them apart
 
 
@@ -112,24 +115,41 @@ class TemplateReader:
         return joined([frame_hypotheses(some, layout) for some in bars])
 
     def _fitted(self, grey: Grey, frames: Frames) -> list[Found]:
-        """Accepted markers; of several fits of one code at one place the first stands."""
-        if not len(frames):
-            return []
-        H = frames.homographies()
-        match = self._soft.match(grey, H)
-        modules = self.library.layout.modules
+        """Accepted markers; of several fits of one code at one place the first stands.
+
+        Of many one frame a place is read first; the others where that one did not read at once.
+        """
         found: list[Found] = []
-        places = np.empty((0, 2))
+        if len(frames) > MANY_FRAMES:
+            self._read(grey, frames.only(_firsts(frames)), READ_AT_ONCE, found)
+        if found:
+            places = np.array([_place(one) for one in found]).reshape(-1, 2)
+            far = np.linalg.norm(frames.centre[:, None] - places, axis=2) >= self._near(frames)
+            frames = frames.only(far.all(axis=1))
+        self._read(grey, frames, None, found)
+        return found
+
+    def _near(self, frames: Frames) -> Floats:
+        """How close (F, 1) px to each frame no second marker is looked for."""
+        sizes = self.library.layout.modules * np.linalg.norm(frames.a, axis=1)
+        out: Floats = np.maximum(3.0, NEAR_SIZES * sizes)[:, None]
+        return out
+
+    def _read(self, grey: Grey, frames: Frames, most: int | None, found: list[Found]) -> None:
+        """Add to ``found`` what frames show, the surest first, up to ``most`` wrong modules."""
+        if not len(frames):
+            return
+        H, near = frames.homographies(), self._near(frames)
+        match = self._soft.match(grey, H)
         for k in _order(frames, match, self.library.layout.code):
-            near = max(3.0, NEAR_SIZES * modules * float(np.linalg.norm(frames.a[k])))
-            if (((places - frames.centre[k]) ** 2).sum(axis=1) < near * near).any():
+            if most is not None and match.wrong[k] > most:
+                break
+            if any(np.linalg.norm(_place(one) - frames.centre[k]) < near[k] for one in found):
                 continue
             code = (int(match.row[k]), int(match.turn[k]), int(match.wrong[k]))
             one = self.fit(grey, H[k], code)
             if one is not None:
                 found.append(one)
-                places = np.vstack([places, one.H[:2, 2] / one.H[2, 2]])
-        return found
 
     def fit(
         self, grey: Grey, H: Floats, code: tuple[int, int, int], blur: Blur | None = None
@@ -220,6 +240,19 @@ def _order(frames: Frames, match: SoftMatch, side: int) -> Ints:
     worth: Bools = (match.wrong * 49 <= most * side * side) & (match.frame <= FRAME_WRONG)
     order = np.lexsort((-match.score, -frames.support, match.wrong))
     out: Ints = order[worth[order]]
+    return out
+
+
+def _firsts(frames: Frames) -> Ints:
+    """The best supported frame of each place in the image."""
+    order = np.argsort(-frames.support, kind="stable")
+    cell = np.floor(frames.centre[order] / PLACE_PX)
+    return order[np.unique(cell, axis=0, return_index=True)[1]]
+
+
+def _place(one: Found) -> Floats:
+    """Image (2,) of a marker's centre."""
+    out: Floats = one.H[:2, 2] / one.H[2, 2]
     return out
 
 
