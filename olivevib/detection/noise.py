@@ -144,14 +144,15 @@ def autocorrelation(noise: Singles, seen: Singles) -> Singles:
     whose nearest neighbours agree by less than DOUBT standard deviations of white noise is white:
     variance alone, with the freedom that the fit took.
     """
-    height, width = noise.shape
+    width = noise.shape[1]
+    flat, mask = noise.ravel(), seen.ravel()  # the border keeps a shift within its row
     out = np.zeros((2 * LAGS + 1, 2 * LAGS + 1), dtype=np.float32)
-    here = np.s_[: height - LAGS, LAGS : width - LAGS]
-    variance = float(np.vdot(noise, noise)) / max(float(seen.sum()), 1.0)
+    variance = float(flat @ flat) / max(float(mask.sum()), 1.0)
     doubt = 0.0
-    for dy, dx, there in _lags(noise.shape):
-        count = max(float((seen[here] * seen[there]).sum()), 1.0)
-        value = float((noise[here] * noise[there]).sum()) / count
+    for dy, dx, _ in _lags(noise.shape):
+        step = dy * width + dx
+        count = max(float(mask[: mask.size - step] @ mask[step:]), 1.0)
+        value = float(flat[: flat.size - step] @ flat[step:]) / count
         out[LAGS + dy, LAGS + dx] = out[LAGS - dy, LAGS - dx] = value
         if 0 < max(dy, abs(dx)) < 2:
             doubt = max(doubt, abs(value) * float(np.sqrt(count)))

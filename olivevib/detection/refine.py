@@ -110,16 +110,15 @@ def fit_template(template: Template, pixels: Pixels) -> Fit | None:
     unknowns = len(end.J)
     if clear.sum() <= 2 * unknowns:
         return None
-    whitened = np.asarray(end.residual * np.sqrt(pixels.trust), dtype=np.float32)
+    root = np.sqrt(pixels.trust)
+    trusted = bool((root == 1).all())
+    whitened = end.residual if trusted else end.residual * root
     rms = float(np.sqrt((whitened[clear] ** 2).sum() / (clear.sum() - unknowns)))
     H = image_homography(end.state.W, (pixels.centre, pixels.scale)) @ template.H
     even = in_even_light(pixels, end.state)
     counts = np.maximum(np.bincount(pixels.cell, minlength=9), 1)
-    root = np.sqrt(pixels.trust)
-    linear = (
-        end.J * root,
-        (inverse.astype(np.float32) @ (WJ / root)).astype(np.float32),
-    )
+    J, E = end.J, np.asarray(inverse.astype(np.float32) @ WJ, dtype=np.float32)
+    linear = (J, E) if trusted else (J * root, np.asarray(E / root, dtype=np.float32))
     slope2 = end.J[2] ** 2 + end.J[5] ** 2  # by a shift along x, along y
     covariance, noise, excess = noise_covariance(pixels, linear, whitened, clear, slope2)
     return Fit(
