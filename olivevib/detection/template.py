@@ -14,6 +14,7 @@ any point spread; the Gaussian between the two makes up the rest of the variance
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import factorial
 
 import cv2
 import numpy as np
@@ -30,6 +31,7 @@ PIXEL_VARIANCE = 1 / 12  # px² of a pixel's own area, as a Gaussian
 SMOOTH = 0.7  # samples: sigma of an edge before it is read
 DENSER = 2  # the card's own samples a texture sample, where it is to measure with
 TAIL = 3.5  # sigmas of a Gaussian that are drawn
+TERMS, LEAST_TERM = 3, 0.05  # of the series for skewed corners: at most, power worth one more
 THREE_TAPS = 0.5  # variance, samples², up to which a Gaussian is three taps
 REACH = 0.6  # modules around the dark square that are drawn
 MARGIN_PX = 2.0  # and px around these; beyond them the edge is repeated
@@ -104,8 +106,9 @@ def draw_template(
     box = apply_homography(H, [[-reach, -reach], [reach, -reach], [reach, reach], [-reach, reach]])
     origin = np.floor(box.min(axis=0) - MARGIN_PX)
     width, height = (np.ceil(box.max(axis=0) + MARGIN_PX) - origin).astype(int) * samples + 1
-    density = denser * samples * _across_px(H)
-    drawn, first = _smooth_card(white, quiet, density, denser * SMOOTH)
+    across, skew = _across_px(H)
+    density = denser * samples * across
+    drawn, first = _smooth_card(white, quiet, density, skew, denser * SMOOTH)
     size = (int(width), int(height))
     if bend is None:
         to_image = np.array([[1 / samples, 0, origin[0]], [0, 1 / samples, origin[1]], [0, 0, 1]])
@@ -137,39 +140,55 @@ def draw_template(
     return Template(texture, origin, H, blur, samples, moving)
 
 
-def _across_px(H: Floats) -> Floats:
-    """How wide a module is across its edges u = const and v = const (2,), px, at the centre."""
-    out: Floats = 1 / np.linalg.norm(np.linalg.inv(homography_jacobian(H, [[0.0, 0.0]])[0]), axis=1)
-    return out
+def _across_px(H: Floats) -> tuple[Floats, float]:
+    """How wide a module is across its edges u = const and v = const (2,), px, at the centre.
+
+    And the correlation of u and v where x and y have none: the cosine between the edges' normals.
+    """
+    normals = np.linalg.inv(homography_jacobian(H, [[0.0, 0.0]])[0])
+    steep = np.linalg.norm(normals, axis=1)
+    return 1 / steep, float(normals[0] @ normals[1] / (steep[0] * steep[1]))
 
 
 def _smooth_card(
-    white: NDArray[np.float32], quiet: int, density: Floats, sigma: float
+    white: NDArray[np.float32], quiet: int, density: Floats, skew: float, sigma: float
 ) -> tuple[NDArray[np.float32], Floats]:
     """A card with ``density`` (2,) samples a module along u and v, and the sample of its centre.
 
-    Its edges are Gaussian steps of ``sigma`` samples. It ends where all is white.
+    Its edges are Gaussian steps of ``sigma`` samples, and so are its corners in the image: there u
+    and v are correlated by ``skew`` (tetrachoric series: Pearson 1900). It ends where all is white.
     """
     core = white[quiet - 1 : len(white) - quiet + 1, quiet - 1 : len(white) - quiet + 1]
     inner = len(core) - 2
     centre = np.ceil(TAIL * sigma) + density * inner / 2
+    terms = 1 + sum(abs(skew) ** n > LEAST_TERM for n in range(1, TERMS))
     across, down = (
-        _smooth_modules(inner, float(m), float(c), sigma)
+        _smooth_modules(inner, float(m), float(c), sigma, terms)
         for m, c in zip(density, centre, strict=True)
     )
-    return np.asarray(down @ core @ across.T, dtype=np.float32), centre
+    rows = [np.float32(skew**n / factorial(n)) * (part @ core) for n, part in enumerate(down)]
+    drawn = np.concatenate(rows, axis=1) @ np.concatenate(list(across), axis=1).T
+    return np.asarray(drawn, dtype=np.float32), centre
 
 
 def _smooth_modules(
-    modules: int, density: float, centre: float, sigma: float
+    modules: int, density: float, centre: float, sigma: float, terms: int
 ) -> NDArray[np.float32]:
-    """How much each sample (K,) of a row sees of each module, and of the white before and after."""
+    """How much each sample of a row sees of each module, and of the white before and after.
+
+    (terms, K, modules + 2): the n-th is the n-th derivative by the sample, in units of sigma.
+    """
     samples = np.arange(int(np.ceil(2 * centre)) + 1)
     edges = centre + density * (np.arange(modules + 1) - modules / 2)
-    beyond = np.zeros((len(samples), modules + 3), dtype=np.float32)
-    beyond[:, 0] = 1
-    beyond[:, 1:-1] = ndtr(((samples[:, None] - edges) / sigma).astype(np.float32))
-    out: NDArray[np.float32] = beyond[:, :-1] - beyond[:, 1:]
+    behind = ((samples[:, None] - edges) / sigma).astype(np.float32)
+    beyond = np.zeros((terms, len(samples), modules + 3), dtype=np.float32)
+    beyond[0, :, 0] = 1
+    beyond[0, :, 1:-1] = ndtr(behind)
+    if terms > 1:
+        beyond[1, :, 1:-1] = np.exp(-0.5 * behind * behind) / np.float32(np.sqrt(2 * np.pi))
+    if terms > 2:
+        beyond[2, :, 1:-1] = -behind * beyond[1, :, 1:-1]
+    out: NDArray[np.float32] = beyond[..., :-1] - beyond[..., 1:]
     return out
 
 
