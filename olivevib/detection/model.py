@@ -63,16 +63,17 @@ def read_texture(template: Template, pixels: Pixels, W: Floats) -> Singles:
     x = (M[0, 0] * X + M[0, 1] * Y + M[0, 2]) * w * step + np.float32(offset[0])
     y = (M[1, 0] * X + M[1, 1] * Y + M[1, 2]) * w * step + np.float32(offset[1])
     parts = [
-        cv2.remap(
-            template.texture,
-            x[None, first : first + MOST_COLUMNS],
-            y[None, first : first + MOST_COLUMNS],
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )
-        for first in range(0, x.size, MOST_COLUMNS)
+        np.concatenate([_remapped(layer, x, y, first) for first in range(0, x.size, MOST_COLUMNS)])
+        for layer in template.layers
     ]
-    return np.ascontiguousarray(np.concatenate(parts, axis=1)[0].T, dtype=np.float32)
+    return np.ascontiguousarray(np.concatenate(parts, axis=1).T, dtype=np.float32)
+
+
+def _remapped(layer: Singles, x: Singles, y: Singles, first: int) -> Singles:
+    """Channels (N, C) at columns x and rows y from the ``first`` on, as many as cv2 takes."""
+    some = np.s_[None, first : first + MOST_COLUMNS]
+    read = cv2.remap(layer, x[some], y[some], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(read[0], dtype=np.float32)
 
 
 def fitted_light(pixels: Pixels, T: Singles, weight: Singles) -> Floats:

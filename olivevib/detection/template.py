@@ -14,6 +14,7 @@ any point spread; the Gaussian between the two makes up the rest of the variance
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import factorial
 
 import cv2
@@ -76,6 +77,12 @@ class Template:
     blur: Blur
     samples: int
     moving: bool = False
+
+    @cached_property
+    def layers(self) -> list[NDArray[np.float32]]:
+        """The texture in parts of 3 and 4 channels: of others cv2.remap reads 1/32 sample off."""
+        cuts = range(3, self.texture.shape[2] - 1, 3)
+        return [np.ascontiguousarray(part) for part in np.split(self.texture, list(cuts), axis=2)]
 
 
 def card(dark: Bools, quiet: int) -> NDArray[np.float32]:
