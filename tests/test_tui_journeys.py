@@ -17,6 +17,8 @@ from tui_app import press, screen_text, settle, started
 
 from olivevib.cli import main
 from olivevib.errors import InputError
+from olivevib.files.prints import marker_text
+from olivevib.marker import load_library
 from olivevib.pipeline.machine import Check
 from olivevib.progress import Cancelled
 from olivevib.trial import Trial
@@ -800,6 +802,37 @@ async def test_this_machine_is_looked_at(workspace, monkeypatch):
         await press(pilot, "D")
         assert "reads webcams" in screen_text(app)
         assert "1 missing" in screen_text(app)
+
+
+async def test_a_library_is_shown_proved_pictured_and_drawn_as_the_commands_do(workspace, capsys):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "L")
+        told_of = words(app, "#outlook-text")
+        assert f"olive49 1\n{marker_text(load_library('olive49'), 1)}" in told_of
+        assert main(["markers", "check"]) == 0
+        assert capsys.readouterr().out.strip() in told_of.replace("\nsmallest", "\n  smallest")
+        await press(pilot, "enter", "text:5-6", "enter")
+        assert "olive49 5" in words(app, "#outlook-text")
+        assert "olive49 1\n" not in words(app, "#outlook-text")
+        await press(pilot, "ctrl+s")
+        assert "Marker 5 of olive49: " in told(app)
+        await press(pilot, "ctrl+g")
+        assert "“new: distance”" in words(app, ".dialog > Static")
+        await press(pilot, "escape")
+        app.screen.query_one("#distance", Input).value = "20"
+        app.screen.query_one("#seed", Input).value = "3"
+        assert await pilot.click("#generate")
+        await settle(pilot)
+        assert "41 codes." in told(app)
+        made = next((workspace / "markers").glob("*20*.toml"))
+        app.screen.query_one("#library", Input).value = f"markers/{made.name}"
+        app.screen.query_one("#ids", Input).focus().value = "400"
+        await press(pilot, "enter")
+        assert "has no marker 400" in words(app, "#outlook-text")
+    assert main(["markers", "draw", "5", "-o", "cli.png"]) == 0
+    assert main(["markers", "generate", "--distance", "20", "--seed", "3", "-o", "cli.toml"]) == 0
+    assert Path("marker-5.png").read_bytes() == Path("cli.png").read_bytes()
+    assert made.read_text(encoding="utf-8") == Path("cli.toml").read_text(encoding="utf-8")
 
 
 async def test_markers_and_a_board_are_printed_as_the_command_prints_them(workspace):

@@ -59,6 +59,7 @@ WALK = (
     ("batch", "escape B"),
     ("row_time", "escape W"),
     ("prints", "escape M enter enter 1 - 8 enter 6 0 enter"),
+    ("libraries", "escape L tab 7 enter"),
     ("machine", "escape D"),
     ("outcome", "escape enter A enter"),
 )

@@ -11,6 +11,7 @@ from pathlib import Path
 from rich.text import Text
 from textual.app import App
 from textual.pilot import Pilot
+from textual.widgets import DataTable
 from textual.worker import WorkerCancelled, WorkerFailed
 
 from olivevib.tui.app import OlivevibApp
@@ -44,7 +45,9 @@ def is_busy(app: App[None]) -> bool:
     nodes = [app, *app.screen_stack, *screen.walk_children()]
     waiting = any(not node._message_queue.empty() for node in nodes)
     due = screen._layout_required or screen._repaint_required or bool(screen._dirty_widgets)
-    return waiting or due or bool(screen._callbacks)
+    tables = screen.query(DataTable)  # they widen their columns when next idle
+    widths = any(t._require_update_dimensions or t._updated_cells for t in tables)
+    return waiting or due or widths or bool(screen._callbacks)
 
 
 @asynccontextmanager

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from olivevib.marker import MarkerLibrary
     from olivevib.pipeline.prints import Prints
 
-FEW = 24  # codes of a generated library: a tree with fewer markers is hardly measured
-
 
 def _library(name: str) -> MarkerLibrary:
     from olivevib.marker import load_library
@@ -49,21 +47,13 @@ def show(arguments: argparse.Namespace, console: Console) -> int:
     library = _library(arguments.library)
     asked = ",".join([*arguments.id, *([arguments.ids] if arguments.ids else [])])
     ids = values.id_list(asked) or tuple(int(i) for i in library.ids)
+    from olivevib.files.prints import marker_text
     from olivevib.pipeline.libraries import only_known
 
     for marker in only_known(library, ids).ids.tolist():
         print(f"{library.name} {marker}")
-        print(_blocks(library, marker))
+        print(marker_text(library, marker))
     return 0
-
-
-def _blocks(library: MarkerLibrary, marker: int) -> str:
-    from olivevib.files.prints import marker_modules
-
-    return "\n".join(
-        "  " + "".join("██" if dark else "  " for dark in row)
-        for row in marker_modules(library, marker)
-    )
 
 
 def draw(arguments: argparse.Namespace, console: Console) -> int:
@@ -106,43 +96,16 @@ def check(arguments: argparse.Namespace, console: Console) -> int:
     from olivevib.marker import check_library
 
     found = check_library(_library(arguments.library))
-    print(f"{found.name}: {found.codes} codes, promised distance {found.promised}")
-    for words, value in (
-        ("to its own rotations", found.rotation),
-        ("between codes, over rotations", found.pair),
-        ("to mirror images", found.mirror),
-    ):
-        print(f"  smallest distance {words:30} {'–' if value is None else value}")
-    for close in found.too_close:
-        print(f"  TOO CLOSE: {close}")
-    print("sound" if found.sound else f"{len(found.too_close)} pairs are too close")
+    print("\n".join(found.lines()))
     return 0 if found.sound else 1
 
 
 def generate(arguments: argparse.Namespace, console: Console) -> int:
     """Draw a new library and write it as TOML that a person can edit."""
-    from olivevib.files.atomic import write_text_atomic
-    from olivevib.marker import MarkerLayout, generate_library, library_text
+    from olivevib.pipeline.new_library import NewLibrary, drawn_words, write_library
 
-    layout = MarkerLayout(modules=arguments.code + 4, code=arguments.code, bar=arguments.code)
-    library = generate_library(
-        arguments.distance, arguments.mirrors, arguments.seed, layout, tick=console.tick
-    )
-    folder = Path("markers") if Path("markers").is_dir() else Path()
-    path = Path(arguments.output) if arguments.output else folder / f"{library.name}.toml"
-    mirrors = " --mirrors" if arguments.mirrors else ""
-    made = (
-        f"made by: olivevib markers generate --distance {arguments.distance}{mirrors} "
-        f"--seed {arguments.seed} --code {arguments.code}"
-    )
-    write_text_atomic(path, library_text(library, made))
-    console.say(f"{library.ids.size} code{'s' * (library.ids.size != 1)}")
-    if library.ids.size < FEW:
-        mirrors = ", leave --mirrors out" if arguments.mirrors else ""
-        console.say(
-            f"That is few. For more, lower --distance (now {arguments.distance}; 12 gives many)"
-            f"{mirrors}, try another --seed, or take larger codes with --code "
-            f"(now {arguments.code}; then printed modules are smaller)."
-        )
+    asked = NewLibrary(arguments.distance, arguments.mirrors, arguments.seed, arguments.code)
+    library, path = write_library(asked, Path(), arguments.output or "", console.tick)
+    console.say(drawn_words(library, asked))
     print(path)
     return 0

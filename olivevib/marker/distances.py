@@ -85,6 +85,20 @@ class LibraryCheck:
         """Whether every code keeps the promised distance."""
         return not self.too_close
 
+    def lines(self) -> list[str]:
+        """The proof in words, a line a distance, the verdict last."""
+        kinds = (
+            ("to its own rotations", self.rotation),
+            ("between codes, over rotations", self.pair),
+            ("to mirror images", self.mirror),
+        )
+        return [
+            f"{self.name}: {self.codes} codes, promised distance {self.promised}",
+            *(f"  smallest distance {k:30} {'–' if v is None else v}" for k, v in kinds),
+            *(f"  TOO CLOSE: {close}" for close in self.too_close),
+            "sound" if self.sound else f"{len(self.too_close)} pairs are too close",
+        ]
+
 
 def check_library(library: MarkerLibrary) -> LibraryCheck:
     """Prove the distances of a library: own rotations, pairs over rotations, mirror images.

@@ -14,6 +14,8 @@ from olivevib.values import counted
 
 if TYPE_CHECKING:
     from olivevib.batch import TrialResult
+    from olivevib.marker import MarkerLibrary
+    from olivevib.pipeline.new_library import NewLibrary
     from olivevib.pipeline.prints import Prints
 
 
@@ -100,6 +102,30 @@ def make_prints(prints: Prints, target: Path) -> Work:
         return Result(f"{harmless(first)}{others}. {ADVICE}")
 
     return Work("print", do)
+
+
+def draw_marker(library: MarkerLibrary, marker: int, target: Path) -> Work:
+    """One marker with its quiet zone, as PNG."""
+
+    def do(tick: Tick) -> Result:
+        from olivevib.files.prints import marker_picture, write_picture
+
+        path = write_picture(target, marker_picture(library, marker))
+        return Result(f"Marker {marker} of {harmless(library.name)}: {harmless(path)}")
+
+    return Work("picture", do)
+
+
+def new_library(asked: NewLibrary, workspace: Path, output: str) -> Work:
+    """A new library of codes, kept in the workspace."""
+
+    def do(tick: Tick) -> Result:
+        from olivevib.pipeline.new_library import drawn_words, write_library
+
+        library, path = write_library(asked, workspace, output, tick)
+        return Result(f"{harmless(path)}: {drawn_words(library, asked)}")
+
+    return Work("new library", do)
 
 
 def keep_preset(folder: Path, name: str, workspace: Path) -> Work:

@@ -1,7 +1,7 @@
 """Printing markers: pictures, sheets and boards at exact scale, as PNG, vector PDF and SVG."""
 
 from olivevib.files.prints.board import board_page
-from olivevib.files.prints.marker import marker_modules, marker_picture
+from olivevib.files.prints.marker import marker_modules, marker_picture, marker_text
 from olivevib.files.prints.page import PAPERS_MM, Page, paper_size
 from olivevib.files.prints.pdf import pdf_bytes
 from olivevib.files.prints.sheet import sheet_pages
@@ -16,6 +16,7 @@ __all__ = [
     "in_words",
     "marker_modules",
     "marker_picture",
+    "marker_text",
     "paper_size",
     "pdf_bytes",
     "sheet_pages",

@@ -29,6 +29,12 @@ def marker_modules(library: MarkerLibrary, wanted: int) -> Bools:
     return dark
 
 
+def marker_text(library: MarkerLibrary, wanted: int) -> str:
+    """One marker as two columns a module, dark modules as blocks."""
+    rows = marker_modules(library, wanted)
+    return "\n".join("  " + "".join("██" if dark else "  " for dark in row) for row in rows)
+
+
 def marker_picture(library: MarkerLibrary, wanted: int, module_px: int = 20) -> Grey:
     """One marker with its quiet zone, ``module_px`` pixels a module, levels 0 and 255."""
     if not 1 <= module_px <= 400:

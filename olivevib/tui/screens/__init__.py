@@ -28,6 +28,7 @@ TOOLS = {
     "row_time": "RowTimePage",
     "machine": "MachinePage",
     "prints": "PrintsPage",
+    "libraries": "LibrariesPage",
 }  # about the workspace, not one trial
 
 

@@ -60,6 +60,7 @@ class TrialsPage(Page):
         Binding("B", "tool('batch')", "Run many trials, season report", show=False),
         Binding("W", "tool('row_time')", "Row time of a camera", show=False),
         Binding("M", "tool('prints')", "Print markers and boards", show=False),
+        Binding("L", "tool('libraries')", "Marker libraries", show=False),
         Binding("D", "tool('machine')", "What works on this machine", show=False),
     ]
 
