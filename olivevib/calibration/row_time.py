@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize_scalar
 
 from olivevib.arrays import Floats, floats
 from olivevib.errors import InputError
@@ -105,6 +104,8 @@ def _coarse(moving: Floats) -> float:
 
 def _refined(moving: Floats, envelope: Floats, cycles: float) -> float:
     """Periods a row that explain most, near a first guess."""
+    from scipy.optimize import minimize_scalar  # heavy: a report needs none
+
     near = 0.5 / moving.shape[1]
     found = minimize_scalar(
         lambda k: -_explained(moving, envelope, k),

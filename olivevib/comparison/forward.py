@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from olivevib.arrays import Bools, Floats
 from olivevib.signals import Samples, fit_stamps
@@ -72,6 +71,8 @@ def sensor_motion(sensor: Samples, corner_hz: float) -> SensorMotion:
     """
     if sensor.unit != "m/s2" or len(sensor.axes) != 3:
         raise ValueError(f"need three axes in m/s2, got {len(sensor.axes)} in {sensor.unit}")
+    from scipy.interpolate import CubicSpline  # heavy: a report needs none
+
     t_s, a = measured(sensor)
     if t_s.size < 16:
         raise ValueError(f"need at least 16 samples, got {t_s.size}")
@@ -107,6 +108,8 @@ def even_acceleration(t_s: Floats, a: Floats) -> tuple[Floats, Floats, bool]:
     fit = fit_stamps(t_s)
     if fit.method == "line" and not fit.dropped.size:
         return fit.t_s, a, False
+    from scipy.interpolate import CubicSpline
+
     n = int(fit.sequence[-1]) + 1
     even_t = fit.t_s[0] + np.arange(n) * (fit.t_s[-1] - fit.t_s[0]) / (n - 1)
     return even_t, np.asarray(CubicSpline(fit.t_s, a)(even_t)), True

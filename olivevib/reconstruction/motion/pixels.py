@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from olivevib.arrays import Floats
 from olivevib.reconstruction.motion.sightings import Observations, Sightings
@@ -148,6 +147,7 @@ def _sharpened(
     lines: list[tuple[Floats, Floats, Floats]], peak_hz: float, reach_hz: float
 ) -> float:
     """The frequency of most power near a peak of the grid."""
+    from scipy.optimize import minimize_scalar  # heavy: a report needs none
 
     def lost(f_hz: float) -> float:
         return -sum(float(line_power(*line, np.array([f_hz]))[0]) for line in lines)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import gc
 import hashlib
-import io
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -23,10 +22,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
+from matplotlib.transforms import ScaledTranslation
 
 from olivevib.arrays import Bools, Floats, Ints
 from olivevib.report.clean import clean
 from olivevib.report.figures.panel import Panel
+from olivevib.report.figures.svg import svg_of
 
 WIDTH_IN = 8.6  # every figure has the width of the page
 TICK_LEFT, TICK_DOWN = 0, 3  # matplotlib's markers
@@ -67,6 +68,7 @@ _STYLE: Any = {
     "axes.spines.right": False,
     "axes.labelsize": 8,
     "axes.titlesize": 8,
+    "axes.titley": 1.0,  # else every title asks all tick labels where they end
     "axes.labelpad": 2.5,
     "xtick.color": QUIET,
     "ytick.color": QUIET,
@@ -127,10 +129,8 @@ def draw(name: str, title: str, height_in: float, paint: Callable[[Figure], None
     with style(), _uncollected():
         figure = Figure(figsize=(WIDTH_IN, height_in))
         paint(figure)
-        buffer = io.StringIO()
-        nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
-        figure.savefig(buffer, format="svg", metadata=nothing)
-    return _tidy(buffer.getvalue(), name, title)
+        text = svg_of(figure)
+    return _tidy(text, name, title)
 
 
 def _tidy(svg: str, name: str, title: str) -> str:
@@ -166,16 +166,11 @@ def _shorten_ids(body: str, name: str) -> str:
 
 
 def _short_path(path: str) -> str:
-    """A path cut to two decimals, and without the letters that SVG lets one leave out."""
-    for pattern in _NEEDLESS:
-        path = pattern.sub("", path)
+    """A path without the letters that SVG lets one leave out."""
     if not re.search("[CQSA]", path):
         path = path.replace("L", " ")
     path = re.sub(r"\s+", " ", path).strip()
     return re.sub(r" ?([A-Za-z]) ?", r"\1", path)
-
-
-_NEEDLESS = tuple(re.compile(p) for p in (r"(?<=\.\d\d)\d+", r"\.00?(?!\d)", r"(?<=\.\d)0(?!\d)"))
 
 
 def _short_attribute(match: re.Match[str]) -> str:
@@ -249,18 +244,19 @@ def light_ticks(
     across, up = ax.get_yaxis_transform(), ax.get_xaxis_transform()
     ax.hlines(at_y, 0, 1, transform=across, color=GRID, lw=0.5, zorder=0.5)
     how: dict[str, Any] = {"ls": "", "color": QUIET, "ms": 2.5, "mew": 0.6, "clip_on": False}
-    words: dict[str, Any] = {"fontsize": 7, "color": QUIET, "annotation_clip": False,
-                             "textcoords": "offset points"}  # fmt: skip
+    words: dict[str, Any] = {"fontsize": 7, "color": QUIET}
+    inch = ax.figure.dpi_scale_trans
     if left:
         ax.yaxis.labelpad = 18
         ax.plot(np.zeros(at_y.size), at_y, marker=TICK_LEFT, transform=across, **how)
+        beside = across + ScaledTranslation(-4.5 / 72, 0, inch)
         for value, word in zip(at_y, _numbers(at_y), strict=True):
-            ax.annotate(word, (0, value), (-4.5, 0), xycoords=across, ha="right",
-                        va="center_baseline", **words)  # fmt: skip
+            ax.text(0, value, word, transform=beside, ha="right", va="center_baseline", **words)
     if bottom:
         ax.plot(at_x, np.zeros(at_x.size), marker=TICK_DOWN, transform=up, **how)
+        below = up + ScaledTranslation(0, -4.5 / 72, inch)
         for value, word in zip(at_x, _numbers(at_x), strict=True):
-            ax.annotate(word, (value, 0), (0, -4.5), xycoords=up, ha="center", va="top", **words)
+            ax.text(value, 0, word, transform=below, ha="center", va="top", **words)
         ax.xaxis.labelpad = 12
 
 

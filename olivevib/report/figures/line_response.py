@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -35,27 +34,31 @@ def line_responses(found: Sequence[Transmission], names: Mapping[int, str]) -> s
         side = (canvas.WIDTH_IN - 0.72 - 0.1 - 0.25 * (columns - 1)) / columns
         right = 0.1 + (columns - len(found)) * (side + 0.25)
         grid = canvas.rows_and_columns(
-            figure, 2, len(found), margins_in=(0.72, right, 0.55, 0.42), gaps_in=(0.25, 0.14)
-        )
+            figure, 2, len(found), margins_in=(0.72, right, 0.55, 0.42), gaps_in=(0.25, 0.14),
+            light=True,
+        )  # fmt: skip
         limits, ticks = _limits(found)
         for c, one in enumerate(found):
             top, low = grid[0][c], grid[1][c]
-            for k in range(3):
-                _axis(top, low, one, k)
+            for ax in (top, low):
+                ax.set_xlim(-0.5, one.curve.f_hz.size - 0.5)
             top.set_yscale("log")
             top.set_ylim(*limits)
-            top.set_yticks(ticks, [f"{100 * t:g}" for t in ticks] if c == 0 else [])
-            top.minorticks_off()
-            top.axhline(1.0, color=canvas.QUIET, lw=0.8, ls=(0, (4, 2)))
             low.set_ylim(-200, 200)
-            low.set_yticks([-180, -90, 0, 90, 180], None if c == 0 else [])
-            for ax, words in ((top, []), (low, [f"{number(f, 4)} Hz" for f in one.curve.f_hz])):
-                ax.set_xlim(-0.5, one.curve.f_hz.size - 0.5)
-                ax.set_xticks(range(one.curve.f_hz.size), words or [""] * one.curve.f_hz.size)
-                ax.grid(axis="y")
+            for k in range(3):
+                _axis(top, low, one, k)
+            top.axhline(100, color=canvas.QUIET, lw=0.8, ls=(0, (4, 2)))
+            canvas.light_ticks(top, [], ticks, left=c == 0, bottom=False)
+            canvas.light_ticks(low, [], [-180, -90, 0, 90, 180], left=c == 0, bottom=False)
+            for at, f_hz in enumerate(one.curve.f_hz):
+                low.annotate(f"{number(f_hz, 4)} Hz", (at, 0), (0, -4.5), fontsize=7, ha="center",
+                             va="top", color=canvas.QUIET, annotation_clip=False,
+                             xycoords=low.get_xaxis_transform(),
+                             textcoords="offset points")  # fmt: skip
             top.set_title(names[one.response], loc="left", pad=3, fontsize=7.5, fontweight="bold")
-        grid[0][0].set_ylabel("size, %")
-        grid[1][0].set_ylabel("phase, °")
+        for ax, words in ((grid[0][0], "size, %"), (grid[1][0], "phase, °")):
+            ax.set_ylabel(words)
+            ax.yaxis.labelpad = 26
         how = [{"color": c, "marker": s, "lw": 0, "ms": 4}
                for c, s in zip(canvas.AXIS_COLOURS, _SHAPES, strict=True)]  # fmt: skip
         canvas.key(figure, 0.72, 0.16, list(zip("xyz", how, strict=True)))
@@ -67,22 +70,24 @@ def line_responses(found: Sequence[Transmission], names: Mapping[int, str]) -> s
 def _axis(top: Axes, low: Axes, one: Transmission, k: int) -> None:
     h1, sigma = one.curve.h1[:, k], one.curve.sigma[:, k]
     at = np.arange(h1.size) + _APART * (k - 1)
-    how: dict[str, Any] = {"fmt": _SHAPES[k], "color": canvas.AXIS_COLOURS[k], "ms": 4,
-                           "capsize": 2, "elinewidth": 1, "mew": 0.9}  # fmt: skip
-    size = np.abs(h1)
+    colour = canvas.AXIS_COLOURS[k]
+    size = 100 * np.abs(h1)
     known = np.isfinite(size) & np.isfinite(sigma)
-    ends = np.array([size - size / (1 + sigma), size * sigma])  # factors on a logarithmic axis
-    top.errorbar(at[known], size[known], yerr=ends[:, known], **how)
     sure = known & (sigma < _LOST)
-    degrees = np.degrees(np.angle(h1))
-    low.errorbar(at[sure], degrees[sure], yerr=np.degrees(sigma[sure]), **how)
+    degrees, away = np.degrees(np.angle(h1)), np.degrees(sigma)
+    for ax, values, lowest, highest, shown in (
+        (top, size, size / (1 + sigma), size * (1 + sigma), known),  # factors: a logarithmic axis
+        (low, degrees, degrees - away, degrees + away, sure),
+    ):
+        ax.vlines(at[shown], lowest[shown], highest[shown], color=colour, lw=1)
+        ax.plot(at[shown], values[shown], _SHAPES[k], color=colour, ms=4, mew=0.9)
 
 
 def _limits(found: Sequence[Transmission]) -> tuple[tuple[float, float], list[float]]:
-    """Both ends of the size, and ticks at 1, 2, 5, 10, … within."""
-    ends: list[Floats] = [np.ones(1)]
+    """Both ends of the size in %, and ticks at 1, 2, 5, 10, … within."""
+    ends: list[Floats] = [np.full(1, 100.0)]
     for t in found:
-        size, sigma = np.abs(t.curve.h1), t.curve.sigma
+        size, sigma = 100 * np.abs(t.curve.h1), t.curve.sigma
         ends += [(size / (1 + sigma)).ravel(), (size * (1 + sigma)).ravel()]
     values = np.concatenate(ends)
     values = values[np.isfinite(values) & (values > 0)]

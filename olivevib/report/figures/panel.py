@@ -21,6 +21,12 @@ class _Untick:
     def _update_ticks(self) -> list[Tick]:
         return []
 
+    def set_tick_params(self, *_: Any, **__: Any) -> None:
+        """Nothing: there are no ticks."""
+
+    def reset_ticks(self) -> None:
+        """Nothing: there are no ticks."""
+
     def get_ticks_position(self) -> str:
         """Where ticks would stand: matplotlib asks when it places a title."""
         return "default"

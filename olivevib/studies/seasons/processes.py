@@ -25,10 +25,14 @@ class Timing:
 
 
 def timed(*arguments: object) -> Timing:
-    """Run a verb to its end; RuntimeError with what it said where it failed."""
+    """Run a verb to its end, its modules compiled as an install keeps them.
+
+    RuntimeError with what it said where it failed.
+    """
+    kept = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     before, started = _spent(), time.monotonic()
     command = [*OLIVEVIB, *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=kept)
     wall = time.monotonic() - started
     if done.returncode not in (0, 3):
         raise RuntimeError(f"{' '.join(command[2:])} failed: {done.stderr[-800:]}")
