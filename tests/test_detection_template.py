@@ -132,6 +132,26 @@ def test_no_bias_where_edges_lie_along_the_pixels(size, turn_deg, psf):
     assert np.sqrt(np.mean(np.square(off))) < 0.0003
 
 
+def test_a_colour_sensor_moves_no_centre():
+    """A demosaiced picture's blur alternates from pixel to pixel: 0.01 px if it is not fitted."""
+    rng = np.random.default_rng(0)
+    off, claimed = [], []
+    for seed in range(12):
+        canvas, H, row = one_marker(24, 45, seed, samples=8)
+        colour = cv2.cvtColor(noisy(canvas.light, rng, 0.5), cv2.COLOR_BayerBG2BGR)
+        grey = cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY)
+        one = fit_card(grey, card(LIBRARY.layout.pattern(LIBRARY.codes[row]), 2), H, LIBRARY.layout)
+        off.append(one.fit.H[:2, 2] - H[:2, 2])
+        J = point_jacobian(
+            one.fit.H, one.fit.to_template, np.zeros((1, 2)), (one.fit.centre, one.fit.scale)
+        )[0]
+        claimed.append(np.trace(J @ one.fit.covariance @ J.T) / 2)
+        assert one.fit.further.size == 1
+    rmse = np.sqrt(np.mean(np.square(off)))
+    assert rmse < 0.004
+    assert rmse < 1.6 * np.sqrt(np.mean(claimed))
+
+
 def test_derivatives_of_points_against_refitting():
     canvas, H, row = one_marker(64, 40, 5)
     white = card(LIBRARY.layout.pattern(LIBRARY.codes[row]), 2)

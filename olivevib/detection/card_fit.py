@@ -14,6 +14,7 @@ from olivevib.detection.smear import further_blur, motion_of, rounder
 from olivevib.detection.template import (
     COARSE,
     LEAST_PATH_PX,
+    MOSAIC,
     REACH,
     Blur,
     draw_template,
@@ -36,6 +37,7 @@ DRAWN = (3, 10)  # drawings at most: of a still marker, of one that moved
 LONGER = (1.0, 1.7)  # starts: of the path that the blur's moments show
 REDRAWN_PATH_PX = 0.3  # change of a path that asks for a new drawing
 REDRAWN_SHAPE_PX = 0.3  # at the corners, of a marker that moved
+BELIEVED = 30.0  # fall of the residuals' chi-squared that a mosaic's six numbers cannot feign
 BEYOND = 0.25  # image sizes by which a marker's card may leave the image
 WIDEST_PX = 900.0  # of a marker's card
 SHARP = Blur()  # of a good lens in focus
@@ -76,7 +78,7 @@ def fit_card(
     if one is not None:
         one = _with_motion(grey, white, layout, one)
     if one is not None and one.noise <= EVEN:
-        return one
+        return _demosaiced(grey, white, layout, one)
     even = _even(grey, white, H, layout, pixels)
     if one is None or even is None:
         return even or one
@@ -118,6 +120,26 @@ def _with_motion(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit)
     if one.blur.path_px > 0 and one.noise > EVEN:
         one = _moving(grey, white, layout, one)
     return one
+
+
+def _demosaiced(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit) -> CardFit:
+    """A still marker whose pixels' noise agrees, with a blur as a colour sensor's mosaic leaves it.
+
+    Only where the residuals show one beyond doubt. The noise that is remembered stays that of
+    residuals which hold the mosaic, as those of followed markers do.
+    """
+    pixels = blurred_pixels(grey, one.fit.H, one.blur, layout)
+    if one.blur.path_px > 0 or np.count_nonzero(one.fit.noise) == 1 or pixels is None:
+        return one
+    template = replace(draw_template(white, one.fit.H, one.blur, layout.quiet), mosaic=True)
+    fit = fit_template(template, pixels)
+    if not fit or not fit.converged:
+        return one
+    fall = 2 * pixels.x.size * np.log(one.fit.rms / fit.rms)
+    if fall < BELIEVED:
+        return one
+    kept = replace(fit, further=fit.further[:-MOSAIC], noise=one.fit.noise, excess=one.fit.excess)
+    return replace(one, fit=kept)
 
 
 def _moving(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit) -> CardFit:

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 from olivevib.arrays import Floats
+from olivevib.detection.mosaic import alternating, bends_of
 from olivevib.detection.pixels import Pixels, Singles
 from olivevib.detection.template import Template
 
@@ -40,7 +41,7 @@ class Unknowns:
         x, y = template.blur.motion_px
         round_px2 = template.blur.variance_px2 * np.eye(2)
         spread = (round_px2 + np.outer((x, y), (x, y)) / 12) / scale
-        further = np.zeros(template.texture.shape[2] - 3)
+        further = np.zeros(template.blurs)
         path = np.array([x, y]) if template.moving else None
         return cls(np.eye(3), np.zeros(6), further, spread, path)
 
@@ -54,7 +55,7 @@ class Unknowns:
 
 
 def read_texture(template: Template, pixels: Pixels, W: Floats) -> Singles:
-    """Texture (3 + S, N) at the pixels seen through W."""
+    """Texture (3 + S, N) at the pixels seen through W, with a mosaic (3 + S + 6, N)."""
     X, Y = pixels.X, pixels.Y
     M = W.astype(np.float32)
     w = 1 / (M[2, 0] * X + M[2, 1] * Y + M[2, 2])
@@ -62,18 +63,27 @@ def read_texture(template: Template, pixels: Pixels, W: Floats) -> Singles:
     step = np.float32(pixels.scale * template.samples)
     x = (M[0, 0] * X + M[0, 1] * Y + M[0, 2]) * w * step + np.float32(offset[0])
     y = (M[1, 0] * X + M[1, 1] * Y + M[1, 2]) * w * step + np.float32(offset[1])
+    parts = [_remapped(layer, x, y) for layer in template.layers]
+    reads = np.ascontiguousarray(np.concatenate(parts, axis=1).T, dtype=np.float32)
+    if not template.mosaic:
+        return reads
+    bends = _remapped(bends_of(template), x, y)[:, :2].T
+    return np.concatenate([reads, alternating(pixels, bends)])
+
+
+def _remapped(layer: Singles, x: Singles, y: Singles) -> Singles:
+    """Channels (N, C) at columns x and rows y, as many at a time as cv2 takes."""
     parts = [
-        np.concatenate([_remapped(layer, x, y, first) for first in range(0, x.size, MOST_COLUMNS)])
-        for layer in template.layers
+        cv2.remap(
+            layer,
+            x[None, first : first + MOST_COLUMNS],
+            y[None, first : first + MOST_COLUMNS],
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )[0]
+        for first in range(0, x.size, MOST_COLUMNS)
     ]
-    return np.ascontiguousarray(np.concatenate(parts, axis=1).T, dtype=np.float32)
-
-
-def _remapped(layer: Singles, x: Singles, y: Singles, first: int) -> Singles:
-    """Channels (N, C) at columns x and rows y from the ``first`` on, as many as cv2 takes."""
-    some = np.s_[None, first : first + MOST_COLUMNS]
-    read = cv2.remap(layer, x[some], y[some], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(read[0], dtype=np.float32)
+    return np.asarray(np.concatenate(parts), dtype=np.float32)
 
 
 def fitted_light(pixels: Pixels, T: Singles, weight: Singles) -> Floats:

@@ -37,6 +37,7 @@ THREE_TAPS = 0.5  # variance, samples², up to which a Gaussian is three taps
 REACH = 0.6  # modules around the dark square that are drawn
 MARGIN_PX = 2.0  # and px around these; beyond them the edge is repeated
 LARGE_PX = 20.0  # side of a module from which the coarse drawing is fine enough
+MOSAIC = 6  # numbers of a blur that alternates from pixel to pixel, see mosaic
 LEAST_PATH_PX = 0.5  # a shorter motion is part of the round blur
 PATH_POINTS = 512  # of a motion path
 
@@ -68,7 +69,8 @@ class Template:
     path's x and y, per px; or, for moments, variances xx, xy and yy.
 
     origin_px (2,): image point of texture sample (0, 0); H (3, 3): start pose, centred modules to
-    px; blur it is drawn with; samples a pixel; moving: S is the one with a motion.
+    px; blur it is drawn with; samples a pixel; moving: S is the one with a motion; mosaic: it is
+    read with MOSAIC numbers more.
     """
 
     texture: NDArray[np.float32]
@@ -77,6 +79,12 @@ class Template:
     blur: Blur
     samples: int
     moving: bool = False
+    mosaic: bool = False
+
+    @property
+    def blurs(self) -> int:
+        """Numbers of the blur, S and those of a mosaic."""
+        return int(self.texture.shape[2]) - 3 + MOSAIC * self.mosaic
 
     @cached_property
     def layers(self) -> list[NDArray[np.float32]]:
