@@ -12,6 +12,7 @@ from olivevib.calibration.boards import (
     EXAMPLES,
     board_from_table,
     dictionary_names,
+    own_codes,
     parse_board,
     predefined,
 )
@@ -29,6 +30,19 @@ def test_charuco_corners_are_those_of_opencv():
     assert np.allclose(board.points_mm, theirs.getChessboardCorners())
     assert board.inverted and board.legacy
     assert "inverted" in board.name and "4x5" in board.name
+
+
+@pytest.mark.parametrize("spec", [EXAMPLES["charuco"], EXAMPLES["arucogrid"]])
+def test_only_the_markers_of_the_board_are_read(spec):
+    board = parse_board(spec)
+    count = {"charuco": 10, "arucogrid": 35}[board.kind]
+    whole, own = predefined(board.dictionary), own_codes(board)
+    picture = np.full((240, 480), 255, np.uint8)
+    for number, x in ((count - 1, 60), (count, 280)):
+        picture[60:180, x : x + 120] = whole.generateImageMarker(number, 120)
+    every = cv2.aruco.ArucoDetector(whole).detectMarkers(picture)[1]
+    assert sorted(np.ravel(every)) == [count - 1, count]
+    assert np.ravel(cv2.aruco.ArucoDetector(own).detectMarkers(picture)[1]) == [count - 1]
 
 
 def test_grid_points_are_centres_and_corners():

@@ -5,6 +5,9 @@ import pytest
 from rendered_markers import Canvas, Look, pose
 
 from olivevib.detection import Detector
+from olivevib.detection.key import make_key
+from olivevib.detection.pixels import marker_pixels
+from olivevib.detection.template import Blur, card
 from olivevib.geometry import apply_homography
 from olivevib.marker import load_library
 from olivevib.tracking import Tracker
@@ -52,6 +55,24 @@ def test_followed_markers_are_as_good_as_their_covariance_says(size, tilt):
             assert np.abs(found[int(i)].corners_px - corners).max() < 0.15
     assert np.sqrt(np.mean(np.square(errors))) < 0.006
     assert 1.3 < np.mean(pulls) < 3.0  # 2 for an honest covariance; 60 pulls: +- 0.26
+
+
+def test_a_key_leaves_out_even_ground_alone():
+    H, layout = pose(11, 64.0, 20, 40, 10, (120.3, 130.7)), LIBRARY.layout
+    white = np.zeros((5, 5), np.float32)
+    white[2, 2] = 1
+    card_ = card(PATTERNS[0], layout.quiet)
+    key = make_key(card_, H, Blur(), layout, white, (480, 360))
+    every = marker_pixels(np.zeros((360, 480), np.uint8), H, 11)
+    assert key.area.sum() == pytest.approx(every.x.size, rel=1e-3)
+    assert key.x.size < 0.75 * every.x.size
+    left = set(zip(every.x, every.y, strict=True)) - set(zip(key.x, key.y, strict=True))
+    x, y = np.array(sorted(left)).T
+    by_x, by_y = (key.template.texture[..., k] for k in (1, 2))
+    i, j = (((at - o) * key.template.samples).astype(int)
+            for at, o in zip((x, y), key.template.origin_px, strict=True))  # fmt: skip
+    slopes = by_x[j, i] ** 2 + by_y[j, i] ** 2
+    assert slopes.sum() < 0.01 * (by_x**2 + by_y**2).sum() / key.template.samples**2
 
 
 def test_a_search_catches_a_jump_of_eight_pixels_and_after_a_miss_of_sixteen():
