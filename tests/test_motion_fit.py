@@ -12,7 +12,8 @@ from olivevib.reconstruction.motion import Anchor, MotionSettings, fit_motion
 from olivevib.reconstruction.motion.decide import Facts, decide, zone
 from olivevib.reconstruction.motion.evaluate import phase_of
 from olivevib.reconstruction.motion.offset import Lines, with_offset
-from olivevib.reconstruction.motion.prepared import prepare
+from olivevib.reconstruction.motion.prepared import candidate_frequencies, prepare
+from olivevib.reconstruction.motion.types import BranchTable
 from olivevib.studies import blind
 from olivevib.studies.blind_scenes import Scene, orbit, rig, sight
 from olivevib.studies.study import Effort
@@ -276,6 +277,34 @@ def test_an_offset_that_was_searched_in_vain_confirms_nothing():
     assert decision.status is LineStatus.SUPPORTED
     assert "out of step" in decision.reasons[0]
     assert decide(facts, fit.anchor, MotionSettings()).status is LineStatus.CONFIRMED
+
+
+def test_two_kinds_of_candidates_that_nearly_coincide_are_both_tried():
+    """10.02 Hz: its own line and its second harmonic's mirror appear 0.07 Hz apart."""
+    s = scene(10.0227, mm=2.0, offset_s=0.0082, kind="steady", span_s=4.5)
+    s = replace(s, amplitude=s.amplitude * np.array([1.0, 0.1])[None, :, None])
+    seen = sight(s, rig(), np.random.default_rng(1))
+    ready = prepare(seen, rig(), anchor_of(s), MotionSettings())
+    apart = np.abs(candidate_frequencies(ready) - s.f_hz)
+    assert apart.min() < 2e-3
+    assert np.sort(apart)[1] < 0.05
+    fit = fit_motion(seen, rig(), anchor_of(s))
+    assert fit.status is LineStatus.CONFIRMED
+    assert abs(fit.f_hz - s.f_hz) < 5e-3
+
+
+def test_where_harmonics_look_alike_a_larger_lead_is_asked():
+    _, fit = fitted(scene(25.3))
+    facts = Facts(fit.branches, 30.0, 4.0, 0.009, 0.3, 1.0, 1.0, 99.0, np.ones(3), np.zeros(3))
+    two, lead = np.array([20.05, 10.05]), np.array([0.0, -60.0])
+    near = BranchTable(two, lead, np.array([1.0, 0.0]), np.full(2, 9e-3), np.ones(2))
+    decision = decide(replace(facts, table=near), fit.anchor, MotionSettings())
+    assert decision.status is LineStatus.SUPPORTED
+    assert "looks like its second harmonic" in decision.reasons[0]
+    away = replace(near, f_hz=np.array([21.05, 8.95]))
+    assert decide(replace(facts, table=away), fit.anchor, MotionSettings()).status is (
+        LineStatus.CONFIRMED
+    )
 
 
 def test_slow_motion_that_no_knots_follow_is_no_line_near_the_frame_rate():

@@ -113,6 +113,7 @@ def weigh(
     span = float(np.ptp(model.problems[0].zero_s))
     if _is_wide(WIDE_SIGMA * offset_sigma_s, float(candidates_hz.max())):
         fitted += _at_times_of_best(model, max(fitted, key=lambda b: b.evidence), candidates_hz)
+    fitted += _doubled(model, max(fitted, key=lambda b: b.evidence), candidates_hz)
     ranked = distinct(fitted + dropped, 0.5 / span)
     return prefer_double(ranked, NEAR_BEST * scale, 0.1 / span)
 
@@ -136,6 +137,15 @@ def _at_times_of_best(model: Model, best: Branch, candidates_hz: Floats) -> list
         if first.evidence > best.evidence - HOPELESS:
             out.append(settle(with_frequency(model, float(first.theta[0])), first.theta))
     return out
+
+
+def _doubled(model: Model, best: Branch, candidates_hz: Floats) -> list[Branch]:
+    """Twice the best one's frequency, from its times: what it shows with its second harmonic."""
+    start = best.theta.copy()
+    start[0] *= 2
+    if start[0] > candidates_hz.max() + 1.0:
+        return []
+    return [settle(with_frequency(model, float(start[0])), start)]
 
 
 def unslipped(model: Model, best: Branch) -> tuple[Branch, bool]:

@@ -22,6 +22,7 @@ NOISE_LIMIT = 5.0  # measured noise over the localiser's above which nothing is 
 BESIDE_LIMIT = 10.0  # sigmas of noise above which a second line near a steady one is believed
 LINE_EVIDENCE = 12.0  # over sway alone below which no line stands out
 AMPLITUDE_SHARE = 0.1  # sigma over amplitude above which a line is blind
+COLLISION_LEAD = 100.0  # asked where harmonics look alike, though the cameras are out of step
 STEP_S = 5e-3  # cameras nearer than this to the same instant count as in step
 NARROW_HZ = 0.3
 CHIRP_HZ_S = 0.5  # change of the apparent frequency that, left unexplained, is a chirp
@@ -75,8 +76,13 @@ def zone(f_hz: float, facts: Facts, harmonic: int = 1) -> str:
     sway = max(narrow, SWAY_HZ, SWAY_SHARE / facts.knot_s) if step else narrow
     if round(f / rate) > 0 and abs(f - rate * round(f / rate)) < sway:
         return "slow sway"
-    if not step:
-        return ""
+    return collision(f_hz, facts, harmonic) if step else ""
+
+
+def collision(f_hz: float, facts: Facts, harmonic: int = 1) -> str:
+    """What the harmonic of f_hz shows the same apparent frequency as, unresolved, or nothing."""
+    rate, f = facts.rate_hz, harmonic * f_hz
+    narrow = max(NARROW_HZ, 1.0 / facts.span_s)
     odd = rate / 2 * (2 * np.floor(f / rate) + 1)
     if abs(f - odd) < narrow:
         return "its own mirror image"
@@ -144,8 +150,11 @@ def _status(
 def _doubts(facts: Facts, settings: MotionSettings) -> list[str]:
     doubts = []
     lead, f = facts.table.lead, float(facts.table.f_hz[0])
-    if lead < CONFIRMED_LEAD:
-        doubts.append(f"it leads by {lead:.1f} of the {CONFIRMED_LEAD:.0f} asked")
+    alike = collision(f, facts)
+    asked = COLLISION_LEAD if alike else CONFIRMED_LEAD
+    if lead < asked:
+        near = f", as it looks like {alike} at this frame rate" if alike else ""
+        doubts.append(f"it leads by {lead:.1f} of the {asked:.0f} asked{near}")
     if facts.chi2 > CHI2_LIMIT:
         doubts.append(f"the motion is not quite of this kind (chi2 {facts.chi2:.2f})")
     if facts.beside > BESIDE_LIMIT:

@@ -26,6 +26,8 @@ from olivevib.reconstruction.motion.types import (
 )
 from olivevib.reconstruction.motion.wander import Growth
 
+SAME = 0.02  # of a cycle over the record: two candidates are one; alike ones of two kinds are not
+
 
 @dataclass(frozen=True)
 class Prepared:
@@ -93,7 +95,7 @@ def candidate_frequencies(ready: Prepared) -> Floats:
     found = br.families(peaks, rate, band)
     if not found.size:
         raise ValueError(f"nothing periodic appears in the band of {low:g}-{high:g} Hz")
-    return br.merged(found, 0.3 / span)
+    return br.merged(found, SAME / span)
 
 
 def band_of(ready: Prepared) -> tuple[float, float]:
