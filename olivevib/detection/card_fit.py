@@ -38,6 +38,7 @@ LONGER = (1.0, 1.7)  # starts: of the path that the blur's moments show
 REDRAWN_PATH_PX = 0.3  # change of a path that asks for a new drawing
 REDRAWN_SHAPE_PX = 0.3  # at the corners, of a marker that moved
 BELIEVED = 30.0  # fall of the residuals' chi-squared that a mosaic's six numbers cannot feign
+WHOLE = 0.97  # mean weight of every ninth of a marker on which a mosaic is looked for
 BEYOND = 0.25  # image sizes by which a marker's card may leave the image
 WIDEST_PX = 900.0  # of a marker's card
 SHARP = Blur()  # of a good lens in focus
@@ -123,13 +124,16 @@ def _with_motion(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit)
 
 
 def _demosaiced(grey: Grey, white: Singles, layout: MarkerLayout, one: CardFit) -> CardFit:
-    """A still marker whose pixels' noise agrees, with a blur as a colour sensor's mosaic leaves it.
+    """A still, whole marker with a blur as a colour sensor's mosaic leaves it.
 
     Only where the residuals show one beyond doubt. The noise that is remembered stays that of
     residuals which hold the mosaic, as those of followed markers do.
     """
+    still = one.blur.path_px == 0 and np.count_nonzero(one.fit.noise) > 1
+    if not (still and one.fit.converged and one.fit.cells.min() >= WHOLE):
+        return one
     pixels = blurred_pixels(grey, one.fit.H, one.blur, layout)
-    if one.blur.path_px > 0 or np.count_nonzero(one.fit.noise) == 1 or pixels is None:
+    if pixels is None:
         return one
     template = replace(draw_template(white, one.fit.H, one.blur, layout.quiet), mosaic=True)
     fit = fit_template(template, pixels)
