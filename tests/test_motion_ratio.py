@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from test_motion_results import F_HZ, fit, marker
 
+from olivevib.pipeline.fitted_camera import without_cameras
 from olivevib.pipeline.fitted_response import with_fitted_responses
 from olivevib.reconstruction.motion import MarkerMotion, fitted_ratio
 from olivevib.report import figures
@@ -98,3 +99,15 @@ def test_the_figure_shows_lines_only_and_no_unsure_phase():
     curve = found[0].curve
     unsure = replace(found[0], curve=replace(curve, sigma=curve.sigma + 2.0))
     assert figures.line_responses([unsure], {3: "3"}).count("<use") < svg.count("<use")
+
+
+def test_the_motion_of_markers_that_stand_still_is_the_cameras_and_leaves_the_others():
+    one = fit(markers=(marker(3), replace(marker(7), cosine=3 * marker(7).cosine)))
+    still, other = without_cameras(one, [3]).markers
+    assert other.cosine[:, :3] == pytest.approx(2 * marker(7).cosine[:, :3])
+    assert other.sine[:, :3] == pytest.approx(0)
+    assert (other.cosine[:, 3:] == 3 * marker(7).cosine[:, 3:]).all()  # shifts only
+    assert still.blind == (True, True) and other.blind == marker(7).blind
+    before, after = (m.amplitude_sigma()[0, 0] for m in (one.markers[1], other))
+    assert after == pytest.approx(np.sqrt(2) * before)  # both were as sure
+    assert without_cameras(one, [9]) is one

@@ -13,6 +13,7 @@ from olivevib.errors import Caution, InputError
 from olivevib.files.store import write_stage
 from olivevib.geometry import StereoRig
 from olivevib.pipeline.fitted import fitted_samples, with_lines
+from olivevib.pipeline.fitted_camera import without_cameras
 from olivevib.pipeline.fitted_response import with_fitted_responses
 from olivevib.pipeline.libraries import corners_mm, pattern_of, trial_library
 from olivevib.pipeline.motions import marker_motion, surveyed
@@ -241,6 +242,7 @@ def analyse(trial: Trial, tick: Tick = silent) -> tuple[Caution, ...]:
     if fit is not None and decided(fit):
         motion, facts, found = fitted_samples(fit, motion, facts)
         phases = phases or found
+        fit = without_cameras(fit, trial.settings.markers.at("fixed"))
     result = analyse_motion(motion, facts, settings, phases, tick)
     result = replace(result, cautions=(*result.cautions, *cautions))
     if fit is not None:
