@@ -83,6 +83,10 @@ def _markers(rows: list[dict[str, Any]]) -> list[str]:
         "  (of the rms no sigma is known; the others' stand in show --json and in the report)",
         "    id place    seen   x mm    y mm    z mm           p-p mm  rms m/s²  frequency",
     ]
+    clocks = [m["frequency_clock_sigma_hz"] for m in rows if _has(m["frequency_clock_sigma_hz"])]
+    if clocks:
+        most = f"{1e3 * max(clocks):.2g} mHz, alike for all"
+        lines.insert(2, f"  (± of a frequency is the fit's; the camera's own clock may add {most})")
     for m in rows:
         a = [
             f"{m['amplitude_mm'][k]:7.3f}" if _has(m["amplitude_mm"][k]) else "      –"

@@ -19,6 +19,7 @@ from olivevib.report.lines import MEANING
 from olivevib.report.plates import Plate, plates
 from olivevib.report.verdict import verdict
 from olivevib.signals import State
+from olivevib.vibration.types import CRYSTAL
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,7 @@ def page_facts(content: ReportContent, tick: Tick = silent) -> dict[str, Any]:
         ],
         "heading": _heading(content),
         "markers": tables.marker_rows(content),
+        "clock_ppm": f"{1e6 * CRYSTAL:.0f}",
         "meanings": [(str(s), words) for s, words in MEANING.items() if s in statuses],
         "reasons": _reasons(content),
         "record": tables.record_sections(content),

@@ -307,6 +307,14 @@ def column_heads(figure: Figure, grid: Sequence[Sequence[Axes]], heads: Sequence
                     fontsize=8, fontweight="bold")  # fmt: skip
 
 
+def log_ticks(ax: Axes, low: float, high: float) -> None:
+    """Ticks of a logarithmic x axis: 1, 2, 5, 10, …, over three decades or more 1, 10, … alone."""
+    steps = (1, 2, 5) if high < 1e3 * low else (1,)
+    ticks = [s * 10.0**d for d in range(-9, 10) for s in steps if low <= s * 10.0**d <= high]
+    ax.set_xticks(ticks, [f"{t:g}" for t in ticks], minor=False)
+    ax.minorticks_off()
+
+
 def thin(t: Floats, values: Floats, most: int = 900) -> tuple[Floats, Floats]:
     """A long trace as the smallest and largest value of each of ``most``/2 stretches.
 

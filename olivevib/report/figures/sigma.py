@@ -38,10 +38,8 @@ def sigmas(trajectory: Trajectory, names: Mapping[int, str]) -> str:
         ax.set_ylim(len(order) - 0.4, -0.6)
         ax.tick_params(axis="y", length=0, labelsize=7.5, labelcolor=canvas.INK)
         ax.set_xlabel("standard deviation of one position, mm (logarithmic)")
-        ax.grid(axis="x", which="both")
-        ax.xaxis.set_major_formatter("{x:g}")
-        ax.xaxis.set_minor_formatter("{x:g}")
-        ax.tick_params(axis="x", which="minor", labelsize=6, length=0)
+        ax.grid(axis="x")
+        canvas.log_ticks(ax, *ax.get_xlim())
         how = [{"color": c, "marker": s, "lw": 1.6, "ms": 4}
                for c, s in zip(canvas.AXIS_COLOURS, _SHAPES, strict=True)]  # fmt: skip
         canvas.key(figure, 1.75, 0.18, list(zip(("x", "y", "z"), how, strict=True)))

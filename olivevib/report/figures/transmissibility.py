@@ -59,7 +59,5 @@ def _limits(ax: Axes, ratios: Mapping[int, LineRatio]) -> None:
     values = np.concatenate([[r.ratio_total, *r.ratio, 1.0] for r in ratios.values()]) * 100
     values = values[np.isfinite(values) & (values > 0)]
     low, high = values.min() / 1.3, values.max() * 1.3
-    ticks = [s * 10.0**d for d in range(-4, 6) for s in (1, 2, 5) if low <= s * 10.0**d <= high]
     ax.set_xlim(low, high)
-    ax.set_xticks(ticks, [f"{t:g}" for t in ticks], minor=False)
-    ax.minorticks_off()
+    canvas.log_ticks(ax, low, high)
