@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,10 @@ from olivevib.reconstruction.motion.decide import Facts, decide, zone
 from olivevib.reconstruction.motion.evaluate import phase_of
 from olivevib.reconstruction.motion.offset import Lines, with_offset
 from olivevib.reconstruction.motion.prepared import candidate_frequencies, prepare
+from olivevib.reconstruction.motion.spline import knots_over
+from olivevib.reconstruction.motion.strays import stray_of
 from olivevib.reconstruction.motion.types import BranchTable
+from olivevib.reconstruction.motion.wander import Ridge
 from olivevib.studies import blind
 from olivevib.studies.blind_scenes import Scene, orbit, rig, sight
 from olivevib.studies.study import Effort
@@ -305,6 +309,28 @@ def test_where_harmonics_look_alike_a_larger_lead_is_asked():
     assert decide(replace(facts, table=away), fit.anchor, MotionSettings()).status is (
         LineStatus.CONFIRMED
     )
+
+
+def test_a_wandering_speed_that_is_not_that_of_the_pictures_is_told():
+    """Across a fold either way on is as good; far from what a second shows it is not the speed."""
+    knots = knots_over(0.0, 4.5, 0.5)
+    t = np.linspace(0.0, 4.5, 300)
+    ridge = Ridge(np.arange(0.5, 4.1, 0.25), np.full(15, 5.0))
+    _, fit = fitted(scene(25.3))
+
+    def told(f_hz: float, bend_hz: float) -> str:
+        bend = np.linalg.lstsq(knots.matrix(t, 1), 2 * np.pi * bend_hz * np.sin(t), rcond=None)[0]
+        branch = SimpleNamespace(theta=np.concatenate([[f_hz, 0, 0, 0, 0], bend]))
+        return stray_of(SimpleNamespace(psi=knots), branch, ridge, (0.0, 4.5), 30.0)
+
+    assert told(25.0, 0.3) == ""
+    assert told(35.0, 0.3) == ""
+    assert "leaves that of the pictures by 0.8 Hz" in told(25.0, 0.8)
+    assert "mirror image" in told(29.9, 0.3)
+    facts = Facts(fit.branches, 30.0, 4.0, 0.009, 0.3, 1.0, 1.0, 99.0, np.ones(3), np.zeros(3))
+    decision = decide(replace(facts, stray="it strays"), fit.anchor, MotionSettings())
+    assert decision.status is LineStatus.SUPPORTED
+    assert "it strays" in decision.reasons[0]
 
 
 def test_slow_motion_that_no_knots_follow_is_no_line_near_the_frame_rate():

@@ -50,6 +50,7 @@ class Facts:
     fast_hz_s: float = 0.0
     beside: float = 0.0
     offset_lost: bool = False
+    stray: str = ""
 
 
 @dataclass(frozen=True)
@@ -161,6 +162,8 @@ def _doubts(facts: Facts, settings: MotionSettings) -> list[str]:
         doubts.append("a second line stands beside it: its speed may wander")
     if facts.noise_scale > NOISE_LIMIT:
         doubts.append(f"the pictures scatter {facts.noise_scale:.1f} times more than they should")
+    if facts.stray:
+        doubts.append(facts.stray)
     if facts.offset_lost:
         doubts.append("no slow sway shows by how much the cameras are out of step")
     low, high = settings.band_hz

@@ -33,6 +33,7 @@ from olivevib.reconstruction.motion.prepared import (
 )
 from olivevib.reconstruction.motion.sightings import Observations
 from olivevib.reconstruction.motion.solve import SHARED, Branch, Model, settle, with_frequency
+from olivevib.reconstruction.motion.strays import Seen, stray_of
 from olivevib.reconstruction.motion.types import (
     Anchor,
     BranchTable,
@@ -73,13 +74,12 @@ def _fit_periodic(ready: Prepared, tick: Tick, lost: bool = False) -> MotionFit:
     candidates = candidate_frequencies(ready)
     weighed = br.weigh(ready.model, candidates, ready.offset_sigma_s, tick)
     model, best = refine(ready, ready.model, weighed.branches[0])
-    kind, fast = "steady", 0.0
+    kind, pace = "steady", None
     if chi2_of(model, best) > WORSE or ready.pixels.scale > WORSE:
         span, knot = (ready.start_s, ready.end_s), ready.pixels.knot_s
         peak = ready.pixels.peaks_hz[0]
         pace = pace_of(observations, knot, span, peak)
         grown = growth_of(observations, knot, span, peak)
-        fast = 0.0 if pace is None else pace.ridge.fastest_hz_s
         if pace is not None and pace.gain > max(WORSE, grown.gain):
             again = prepare(observations, rig, clock, settings, pace.phase)
             rate, sigma = observations.frame_rate_hz, again.offset_sigma_s
@@ -99,7 +99,10 @@ def _fit_periodic(ready: Prepared, tick: Tick, lost: bool = False) -> MotionFit:
         if abs(best.theta[1] - before) > 0.25 / best.theta[0]:  # all was weighed at other times
             return _from_offset(ready, best, tick, lost)
         model, best = refine(ready, model, best)
-    return finished(ready, (model, best), weighed, kind, (fast, lost))
+    fast, stray = 0.0 if pace is None else pace.ridge.fastest_hz_s, ""
+    if pace is not None and kind == "wandering":
+        stray = stray_of(model, best, pace.ridge, pace.span, observations.frame_rate_hz)
+    return finished(ready, (model, best), weighed, kind, Seen(fast, lost, stray))
 
 
 def _from_offset(ready: Prepared, best: Branch, tick: Tick, lost: bool) -> MotionFit:
@@ -165,14 +168,10 @@ def finished(
     fitted: tuple[Model, Branch],
     weighed: br.Weighed,
     kind: str,
-    seen: tuple[float, bool],
+    seen: Seen,
 ) -> MotionFit:
-    """Motions, covariance, verdict.
-
-    seen: largest change of the apparent frequency, Hz/s, and whether the offset was searched for
-    in vain.
-    """
-    (model, best), (fast, lost) = fitted, seen
+    """Motions, covariance, verdict."""
+    model, best = fitted
     chi2 = chi2_of(model, best)
     table = table_of(ready, weighed, chi2)
     scale = max(1.0, chi2) * ready.pixels.learned
@@ -191,9 +190,10 @@ def finished(
         strength=br.strength(model, best) / max(1.0, chi2),
         amplitude_mm=amplitude,
         sigma_mm=strongest.amplitude_sigma()[0, :3],
-        fast_hz_s=fast,
+        fast_hz_s=seen.fast_hz_s,
         beside=ready.pixels.beside if kind == "steady" else 0.0,
-        offset_lost=lost,
+        offset_lost=seen.offset_lost,
+        stray=seen.stray,
     )
     decision = decide(facts, ready.anchor, ready.settings)
     return _result(ready, model, best, facts, decision, (markers, timing, kind))
