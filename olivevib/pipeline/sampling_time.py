@@ -22,6 +22,7 @@ from olivevib.reconstruction.motion import (
     Pattern,
     fit_motion,
     observe,
+    steady_ends,
 )
 from olivevib.reconstruction.motion.types import Gain
 from olivevib.tracking import Track
@@ -159,6 +160,8 @@ def fit_trial(
     )
     try:
         seen = observe(left, right, corners_mm, rows, patterns)
+        ends = steady_ends(seen)
+        seen = seen if ends is None else ends.of(seen)
         return fit_motion(seen, rig, anchor(trial, tracks, clock), settings, tick)
     except ValueError:  # no marker was seen often enough by both cameras
         return None

@@ -1,6 +1,7 @@
 """The continuous-time motion of markers, seen row by row, and its true frequency."""
 
 from olivevib.reconstruction.motion.drawing import Pattern
+from olivevib.reconstruction.motion.ends import steady_ends
 from olivevib.reconstruction.motion.fit import fit_motion
 from olivevib.reconstruction.motion.observe import observe
 from olivevib.reconstruction.motion.ratio import FittedRatio, fitted_ratio
@@ -31,4 +32,5 @@ __all__ = [
     "fit_motion",
     "fitted_ratio",
     "observe",
+    "steady_ends",
 ]

@@ -212,9 +212,13 @@ class PixelLine:
         c = np.linalg.lstsq(X, self.r, rcond=None)[0]
         return X, c, self.r - X @ c
 
+    def rest(self, phase: Floats) -> Floats:
+        """What a line of this phase and its double leave (N, d), over the localiser's noise."""
+        return self._fit(phase)[2]
+
     def left_over(self, phase: Floats) -> float:
-        """Squares that a line of this phase and its double leave."""
-        return float(np.sum(self._fit(phase)[2] ** 2))
+        """Squares of that."""
+        return float(np.sum(self.rest(phase) ** 2))
 
     def growing(self, phase: Floats, u: Floats, share: float) -> tuple[Floats, Floats]:
         """Derivative of the line by its growth along u, and what the line leaves (N, d) each."""
