@@ -160,7 +160,7 @@ def fit_trial(
     )
     try:
         seen = observe(left, right, corners_mm, rows, patterns)
-        ends = steady_ends(seen)
+        ends = steady_ends(seen) if times.steady_s else steady_ends(seen, math.inf)
         seen = seen if ends is None else ends.of(seen)
         return fit_motion(seen, rig, anchor(trial, tracks, clock), settings, tick)
     except ValueError:  # no marker was seen often enough by both cameras

@@ -1,8 +1,8 @@
 """Start-up and shut-down that a search by windows of a second has left in a steady record.
 
 A machine that stops within the last half second of a recording changes its speed where no window
-fits any more. The steady line and a spline describe the pixels of the steady part to their noise;
-frames at either end that they miss by far are the ramp.
+fits any more; one that runs near the frame rate looks like sway to every window. One line and a
+spline describe the pixels of the steady part to their noise; what they miss by far is a ramp.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from olivevib.arrays import Bools
 from olivevib.reconstruction.motion.observe import FEWEST, gather
 from olivevib.reconstruction.motion.pixels import look
 from olivevib.reconstruction.motion.sightings import MarkerSightings, Observations, Sightings
@@ -21,6 +20,7 @@ KNOT_S = 0.2
 BIN_S = 0.1
 FAR = 4.0  # rms of an end's bin over that of the usual bin: it is no part of the steady motion
 LONGEST_S = 1.0  # that is cut at an end; what misses for longer is no ramp
+SHORTEST_S = 2.0  # that must be left
 ROUNDS = 12
 
 Span = tuple[float, float]
@@ -47,8 +47,12 @@ class Ends:
         return gather(tuple(often), (*observations.skipped, *seldom))
 
 
-def steady_ends(observations: Observations) -> Ends | None:
-    """Where the steady motion ends in each camera; None where nothing has to be cut."""
+def steady_ends(observations: Observations, most_s: float = LONGEST_S) -> Ends | None:
+    """Where the steady motion begins and ends in each camera; None where nothing is to be cut.
+
+    most_s: that may be cut at an end; infinite where nobody knows yet when the machine ran: then
+    the longest part that one line and a spline describe is taken.
+    """
     whole = ends = Ends(_span(observations, "left"), _span(observations, "right"))
     for _ in range(ROUNDS):
         try:
@@ -59,24 +63,25 @@ def steady_ends(observations: Observations) -> Ends | None:
         if not peaks:
             return None
         shorter = Ends(
-            _shorter(inside.markers, "left", peaks[0], ends.left),
-            _shorter(inside.markers, "right", peaks[0], ends.right),
+            _described(inside.markers, "left", peaks[0], ends.left),
+            _described(inside.markers, "right", peaks[0], ends.right),
         )
         if shorter == ends:
             return None if ends == whole else ends
         ends = shorter
-        cuts = [
-            abs(a - b)
-            for mine, all_ in ((ends.left, whole.left), (ends.right, whole.right))
-            for a, b in zip(mine, all_, strict=True)
-        ]
-        if max(cuts) > LONGEST_S:
+        pairs = ((ends.left, whole.left), (ends.right, whole.right))
+        if (
+            max(abs(a - b) for mine, all_ in pairs for a, b in zip(mine, all_, strict=True))
+            > most_s
+        ):
             return None
-    return ends
+        if min(mine[1] - mine[0] for mine, _ in pairs) < SHORTEST_S:
+            return None
+    return None
 
 
-def _shorter(markers: tuple[MarkerSightings, ...], side: str, peak_hz: float, span: Span) -> Span:
-    """The span less the bins at its ends that the steady line misses by far, and a bin more."""
+def _described(markers: tuple[MarkerSightings, ...], side: str, peak_hz: float, span: Span) -> Span:
+    """The longest run of bins that the steady line describes, less a bin where it was cut."""
     count = max(1, round((span[1] - span[0]) / BIN_S))
     edges = np.linspace(*span, count + 1)
     squares, frames = np.zeros(count), np.zeros(count)
@@ -89,15 +94,10 @@ def _shorter(markers: tuple[MarkerSightings, ...], side: str, peak_hz: float, sp
         frames += np.bincount(at, minlength=count)
     size = np.sqrt(squares / np.maximum(frames, 1))
     far = size > FAR * np.median(size[frames > 0])
-    first, last = _run(far), count - _run(far[::-1])
-    return float(edges[min(first, count)]), float(edges[max(last, 0)])
-
-
-def _run(far: Bools) -> int:
-    """Bins to leave out at the beginning: those that are far without a break, and one more."""
-    near = np.flatnonzero(~far)
-    first = int(near[0]) if near.size else len(far)
-    return first + 1 if first else 0
+    steps = np.flatnonzero(np.diff(np.concatenate([[True], far, [True]]).astype(int)))
+    first, last = max(zip(steps[::2], steps[1::2], strict=True), key=lambda run: run[1] - run[0])
+    first, last = first + (first > 0), last - (last < count)
+    return float(edges[first]), float(edges[max(last, first + 1)])
 
 
 def _span(observations: Observations, side: str) -> Span:

@@ -26,6 +26,8 @@ STEP_S = 2e-3
 FLOOR_S = 3e-3  # sigma of what the search finds, at least
 SLOW_KNOT_S = 0.3
 CLEAR = 30.0  # drop of the squares over the noise that a minimum must show
+AGREE = 40.0  # squares over the noise, a marker, with which two slow curves still agree;
+AGREE_SHARE = 0.1  # or this share of the usual ones: turning and depth are left out here
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,9 @@ def with_offset(
         cost += _cost(marker, rig, lines, lags, noise)
     k = int(np.argmin(cost))
     inside = 0 < k < lags.size - 1
-    clear = bool(np.median(cost) - cost[k] > CLEAR) and inside
+    usual = float(np.median(cost))
+    agree = cost[k] < max(AGREE_SHARE * usual, AGREE * len(observations.markers))
+    clear = bool(usual - cost[k] > CLEAR and agree and inside)
     found = float(lags[k]) if clear else anchor.right_offset_s
     sigma = FLOOR_S if clear else WEAK_S
     return replace(anchor, right_offset_s=found, right_offset_sigma_s=sigma), clear
