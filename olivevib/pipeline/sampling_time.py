@@ -32,6 +32,9 @@ from olivevib.vibration import SamplingFacts, find_phases
 
 DECLARED_SHARE = 0.02  # sigma of a row time that was declared without one
 DECLARED_OFFSET_S = 5e-4  # sigma of an offset that was declared: typed, not measured
+LEAST_STEADY_S = 1.5  # of shaking that windows call steady: less holds too few frames for a fit
+    1.5  # of shaking that windows call steady: shorter ones hold too few frames for a fit
+)
 
 
 class RowTime(NamedTuple):
@@ -127,13 +130,17 @@ class TrialTimes:
 def steady_interval(trajectory: Trajectory, sway_hz: float) -> tuple[float, float] | None:
     """When the machine ran steadily, from what was triangulated; None where it is not told.
 
+    What is too short for a fit is a beat of ramp and sway, near the frame rate.
+
     Above half the frame rate the triangulated motion is an alias, but its size and its coming and
     going are right.
     """
     motion = {int(i): trajectory.samples(int(i)) for i in trajectory.ids}
     phases = find_phases({i: s for i, s in motion.items() if s.t_s.size > 1}, sway_hz)
     found = next((p for p in phases if p.name == "steady"), None)
-    return None if found is None else (found.start_s, found.end_s)
+    if found is None or found.duration_s < LEAST_STEADY_S:
+        return None
+    return found.start_s, found.end_s
 
 
 def fit_trial(
