@@ -33,8 +33,6 @@ from olivevib.vibration import SamplingFacts, find_phases
 DECLARED_SHARE = 0.02  # sigma of a row time that was declared without one
 DECLARED_OFFSET_S = 5e-4  # sigma of an offset that was declared: typed, not measured
 LEAST_STEADY_S = 1.5  # of shaking that windows call steady: less holds too few frames for a fit
-    1.5  # of shaking that windows call steady: shorter ones hold too few frames for a fit
-)
 
 
 class RowTime(NamedTuple):
