@@ -277,9 +277,15 @@ def test_a_second_harmonic_that_looks_like_sway_does_not_hide_the_offset():
 def test_an_offset_that_was_searched_in_vain_confirms_nothing():
     _, fit = fitted(scene(25.3))
     facts = Facts(fit.branches, 30.0, 4.0, 0.009, 0.3, 1.0, 1.0, 99.0, np.ones(3), np.zeros(3))
-    decision = decide(replace(facts, offset_lost=True), fit.anchor, MotionSettings())
+    two, flat = np.array([25.3, 4.7]), np.ones(2)
+    near = BranchTable(two, np.array([0.0, -900.0]), np.array([1.0, 0.0]), 9e-3 * flat, flat)
+    lost = replace(facts, table=near, offset_lost=True)
+    decision = decide(lost, fit.anchor, MotionSettings())
     assert decision.status is LineStatus.SUPPORTED
     assert "out of step" in decision.reasons[0]
+    far = replace(near, evidence=np.array([0.0, -1100.0]))
+    sure = decide(replace(lost, table=far), fit.anchor, MotionSettings())
+    assert sure.status is LineStatus.CONFIRMED
     assert decide(facts, fit.anchor, MotionSettings()).status is LineStatus.CONFIRMED
 
 

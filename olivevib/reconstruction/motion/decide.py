@@ -22,6 +22,7 @@ NOISE_LIMIT = 5.0  # measured noise over the localiser's above which nothing is 
 BESIDE_LIMIT = 10.0  # sigmas of noise above which a second line near a steady one is believed
 LINE_EVIDENCE = 12.0  # over sway alone below which no line stands out
 AMPLITUDE_SHARE = 0.1  # sigma over amplitude above which a line is blind
+LOST_LEAD = 1000.0  # asked where the fit alone tells the cameras' offset
 COLLISION_LEAD = 100.0  # asked where harmonics look alike, though the cameras are out of step
 STEP_S = 5e-3  # cameras nearer than this to the same instant count as in step
 NARROW_HZ = 0.3
@@ -164,7 +165,7 @@ def _doubts(facts: Facts, settings: MotionSettings) -> list[str]:
         doubts.append(f"the pictures scatter {facts.noise_scale:.1f} times more than they should")
     if facts.stray:
         doubts.append(facts.stray)
-    if facts.offset_lost:
+    if facts.offset_lost and lead < LOST_LEAD:
         doubts.append("no slow sway shows by how much the cameras are out of step")
     low, high = settings.band_hz
     if not low <= f <= high:
