@@ -69,13 +69,9 @@ def steady_ends(observations: Observations, most_s: float = LONGEST_S) -> Ends |
         if shorter == ends:
             return None if ends == whole else ends
         ends = shorter
-        pairs = ((ends.left, whole.left), (ends.right, whole.right))
-        if (
-            max(abs(a - b) for mine, all_ in pairs for a, b in zip(mine, all_, strict=True))
-            > most_s
-        ):
-            return None
-        if min(mine[1] - mine[0] for mine, _ in pairs) < SHORTEST_S:
+        left = np.array([ends.left, ends.right])
+        cut = np.abs(left - [whole.left, whole.right])
+        if cut.max() > most_s or np.ptp(left, axis=1).min() < SHORTEST_S:
             return None
     return None
 
@@ -107,15 +103,4 @@ def _span(observations: Observations, side: str) -> Span:
 
 def _within(view: Sightings, span: Span) -> Sightings:
     """The sightings inside a span."""
-    keep = (view.row_zero_s >= span[0]) & (view.row_zero_s <= span[1])
-    drawn = view.drawn
-    return replace(
-        view,
-        frame=view.frame[keep],
-        row_zero_s=view.row_zero_s[keep],
-        row=view.row[keep],
-        px=view.px[keep],
-        covariance_px2=view.covariance_px2[keep],
-        exposure_s=view.exposure_s[keep],
-        drawn=None if drawn is None else replace(drawn, px=drawn.px[keep]),
-    )
+    return view.only((view.row_zero_s >= span[0]) & (view.row_zero_s <= span[1]))

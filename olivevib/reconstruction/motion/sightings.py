@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from olivevib.arrays import Floats, Ints, floats, ints
+from olivevib.arrays import Bools, Floats, Ints, floats, ints
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,20 @@ class Sightings:
             object.__setattr__(self, name, floats(name, getattr(self, name), shape))
         object.__setattr__(
             self, "exposure_s", floats("exposure_s", self.exposure_s, (n,), nan=True)
+        )
+
+    def only(self, keep: Bools) -> Sightings:
+        """The sightings ``keep`` (N,)."""
+        drawn = self.drawn
+        return replace(
+            self,
+            frame=self.frame[keep],
+            row_zero_s=self.row_zero_s[keep],
+            row=self.row[keep],
+            px=self.px[keep],
+            covariance_px2=self.covariance_px2[keep],
+            exposure_s=self.exposure_s[keep],
+            drawn=None if drawn is None else replace(drawn, px=drawn.px[keep]),
         )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from olivevib.arrays import Floats
 from olivevib.reconstruction.motion.solve import SHARED, Branch, Model
 from olivevib.reconstruction.motion.wander import Ridge
+from olivevib.vibration.verdict import fold
 
 STRAY_HZ = 0.5  # that fit and pictures may differ by; windows of a second tell 0.1 Hz apart
 MARGIN_HZ = 0.05  # nearer to a multiple of half the frame rate counts as across it
@@ -54,7 +55,7 @@ def stray_of(
         )
     seen = np.interp(t, ridge.t_s, ridge.f_hz)
     away = min(
-        float(np.abs(np.abs(h * f - rate_hz * np.round(h * f / rate_hz)) - seen).max())
+        max(abs(fold(h * one, rate_hz) - at) for one, at in zip(f, seen, strict=True))
         for h in (1, 2)
     )
     if away > STRAY_HZ:
