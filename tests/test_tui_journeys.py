@@ -619,6 +619,9 @@ async def test_help_footer_and_palette_on_every_screen(workspace):
             await look_around(app, pilot)
         await press(pilot, "escape", "escape", "n")
         await look_around(app, pilot)
+        for tool in "PBWML":
+            await press(pilot, "escape", tool)
+            await look_around(app, pilot)
 
 
 async def look_around(app, pilot) -> None:

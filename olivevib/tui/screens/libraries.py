@@ -38,8 +38,8 @@ class LibrariesPage(FormPage):
     )
     JUMPS: ClassVar[tuple[Jump, ...]] = (Jump("f", "#form"), Jump("o", "#outlook"))
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("ctrl+s", "draw", "Write the picture"),
-        Binding("ctrl+g", "generate", "Draw a new library"),
+        Binding("ctrl+s", "draw", "Picture"),
+        Binding("ctrl+g", "generate", "New library"),
     ]
 
     class Looked(Message):
