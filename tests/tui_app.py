@@ -61,6 +61,15 @@ async def started(
         yield app, pilot
 
 
+async def shown(pilot: Pilot[None], *words: str, patience_s: float = 20.0) -> str:
+    """What is on screen once all these words are; fails with the screen where they do not come."""
+    ends = asyncio.get_running_loop().time() + patience_s
+    while any(word not in (text := screen_text(pilot.app)) for word in words):
+        assert asyncio.get_running_loop().time() < ends, f"{words} did not come:\n{text}"
+        await settle(pilot)
+    return text
+
+
 async def press(pilot: Pilot[None], *keys: str) -> None:
     """Press keys one after the other, each with all that it sets off; ``text:…`` is typed."""
     for key in keys:
@@ -68,7 +77,7 @@ async def press(pilot: Pilot[None], *keys: str) -> None:
         await settle(pilot)
 
 
-def screen_text(app: OlivevibApp) -> str:
+def screen_text(app: App[None]) -> str:
     """What is on screen, line by line."""
     return "\n".join(strip.text.rstrip() for strip in app.screen._compositor.render_strips())
 
