@@ -6,6 +6,7 @@ from rendered_markers import Canvas, Look, pose
 
 from olivevib.detection import Detector
 from olivevib.detection.key import make_key
+from olivevib.detection.key_fit import batches_of, fit_keys
 from olivevib.detection.pixels import marker_pixels
 from olivevib.detection.template import Blur, card
 from olivevib.geometry import apply_homography
@@ -73,6 +74,31 @@ def test_a_key_leaves_out_even_ground_alone():
             for at, o in zip((x, y), key.template.origin_px, strict=True))  # fmt: skip
     slopes = by_x[j, i] ** 2 + by_y[j, i] ** 2
     assert slopes.sum() < 0.01 * (by_x**2 + by_y**2).sum() / key.template.samples**2
+
+
+@pytest.mark.parametrize(("row", "column"), [(0, 1), (1, 1)], ids=["slant", "stretch"])
+def test_a_slant_of_the_rows_is_told_in_full_though_the_key_is_drawn_upright(row, column):
+    """The key's blur is slanted with it, the camera's is not: 0.3 % of the slant at 32 px."""
+    layout, rng = LIBRARY.layout, np.random.default_rng(3)
+    white = np.zeros((5, 5), np.float32)
+    white[2, 2] = 1
+    told = []
+    for k in range(24):
+        H = pose(11, 32.0, 20, *rng.uniform(0, 360, 2), 60 + rng.uniform(0, 1, 2))
+        key = make_key(card(PATTERNS[k], layout.quiet), H, Blur(), layout, white, (121, 121))
+        seen = []
+        for slant in (0.015, -0.015):
+            A = np.eye(3)
+            A[row, column] += slant
+            about = np.array([[1, 0, 60.2], [0, 1, 60.7], [0, 0, 1]])
+            canvas = Canvas(121, 121, Look(noise=0.3, samples=8), rng)
+            canvas.add(PATTERNS[k], about @ A @ np.linalg.inv(about) @ H)
+            fit = fit_keys(canvas.grey(), batches_of([key]), np.zeros((1, 2), int), np.eye(3)[None])
+            seen.append(np.linalg.inv(fit.W[0] / fit.W[0, 2, 2])[row, column])
+        told.append((seen[0] - seen[1]) / 0.03)
+    error = np.std(told) / np.sqrt(len(told))
+    assert error < 0.0006
+    assert np.mean(told) == pytest.approx(1, abs=max(3 * error, 0.0008))
 
 
 def test_a_search_catches_a_jump_of_eight_pixels_and_after_a_miss_of_sixteen():

@@ -23,6 +23,7 @@ from olivevib.detection.template import (
     REACH,
     Blur,
     Template,
+    by_variances,
     draw_template,
     module_px,
 )
@@ -39,8 +40,9 @@ class Key:
     template: texture with pose and blur; x, y (N,): its pixels there, along edges each, on even
     ground a quarter; area (N,): pixels that each stands for; X, Y (N,): the same about ``centre``
     (2,) px in units of ``scale`` px; coarse (Q,): a quarter of all; cells (9, N): row k averages
-    over the k-th ninth; patch to search with; spread (15, 15): sum of J R J' for unit
-    contrast, R the correlation of the pixels' noise; None where it is white.
+    over the k-th ninth; patch to search with; pull (8, 3): by how much a blur beyond the drawing's
+    of variances xx, xy, yy px² draws the entries of the homography; spread (15, 15): sum of J R J'
+    for unit contrast, R the correlation of the pixels' noise; None where it is white.
     """
 
     template: Template
@@ -54,6 +56,7 @@ class Key:
     coarse: NDArray[np.intp]
     cells: Singles
     patch: Patch
+    pull: Floats
     spread: Floats | None
 
     @property
@@ -85,12 +88,12 @@ def make_key(
     cells = area * (pixels.cell == np.arange(9)[:, None])
     cells /= np.maximum(cells.sum(axis=1, keepdims=True), 1)
     white_noise = np.count_nonzero(noise) == 1
-    spread = None if white_noise else _spread(template, pixels.X, pixels.Y, pixels.x, pixels.y,
-                                              pixels.scale, noise)  # fmt: skip
+    J = _jacobian(template, pixels)
+    spread = None if white_noise else _spread(J, pixels, noise)
     return Key(
         template, pixels.x, pixels.y, pixels.X, pixels.Y, area, pixels.centre, pixels.scale,
         np.flatnonzero((pixels.x % 2 == 0) & (pixels.y % 2 == 0)), cells.astype(np.float32),
-        patch_of(template, layout), spread,
+        patch_of(template, layout), _pull(J, template, pixels), spread,
     )  # fmt: skip
 
 
@@ -99,32 +102,43 @@ def _telling(template: Template, pixels: Pixels) -> tuple[Bools, Singles]:
 
     Where the drawing is flat a pixel tells of the light only: a quarter of those is enough.
     """
-    at = (np.stack([pixels.y, pixels.x]) - template.origin_px[::-1, None]) * template.samples
-    j, i = at.astype(int)
-    slope2 = (template.texture[j, i, 1:3] ** 2).sum(axis=1)
+    slope2 = (template.texture[_samples(template, pixels)][:, 1:3] ** 2).sum(axis=1)
     flat = slope2 < FLAT * slope2.max()
     keep: Bools = ~flat | ((pixels.x % 2 == 0) & (pixels.y % 2 == 0))
     share = max(float(flat.sum()), 1.0) / max(float((flat & keep).sum()), 1.0)
     return keep, np.where(flat[keep], share, 1.0).astype(np.float32)
 
 
-def _spread(
-    template: Template,
-    X: Singles,
-    Y: Singles,
-    x: NDArray[np.intp],
-    y: NDArray[np.intp],
-    scale: float,
-    noise: Singles,
-) -> Floats:
-    """J R J' (15, 15) of the whole marker at the key pose, for unit contrast."""
-    offset = (np.stack([x, y]).T - template.origin_px) * template.samples
-    texture = template.texture[offset[:, 1].astype(int), offset[:, 0].astype(int)]
-    T, p, q = texture[:, 0], scale * texture[:, 1], scale * texture[:, 2]
+def _samples(template: Template, pixels: Pixels) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns (N,) of the texture at the pixels, at the key pose."""
+    at = (np.stack([pixels.y, pixels.x]) - template.origin_px[::-1, None]) * template.samples
+    j, i = at.astype(np.intp)
+    return j, i
+
+
+def _jacobian(template: Template, pixels: Pixels) -> Singles:
+    """Derivatives (15, N) of the pixels by all unknowns at the key pose, for unit contrast."""
+    X, Y, texture = pixels.X, pixels.Y, template.texture[_samples(template, pixels)]
+    T, p, q = texture[:, 0], pixels.scale * texture[:, 1], pixels.scale * texture[:, 2]
     back = -(X * p + Y * q)
     one = np.ones_like(X)
-    J = np.stack([p * X, p * Y, p, q * X, q * Y, q, back * X, back * Y,
-                  one, X, Y, T, X * T, Y * T, texture[:, 3]])  # fmt: skip
+    return np.stack([p * X, p * Y, p, q * X, q * Y, q, back * X, back * Y,
+                     one, X, Y, T, X * T, Y * T, texture[:, 3]])  # fmt: skip
+
+
+def _pull(J: Singles, template: Template, pixels: Pixels) -> Floats:
+    """What a fit with Jacobian J takes for W, per px² of variances xx, xy, yy (8, 3)."""
+    at = _samples(template, pixels)
+    missed = [part[at] for part in by_variances(template.texture[..., 0], template.samples)]
+    A = (J @ J.T).astype(np.float64)
+    taken = np.linalg.solve(A + 1e-9 * np.trace(A) * np.eye(len(A)), J @ np.stack(missed).T)
+    out: Floats = taken[:GEOMETRY]
+    return out
+
+
+def _spread(J: Singles, pixels: Pixels, noise: Singles) -> Floats:
+    """J R J' (15, 15) of the whole marker at the key pose."""
+    x, y = pixels.x, pixels.y
     left, top = int(x.min()) - LAGS, int(y.min()) - LAGS
     width, height = int(x.max()) - left + LAGS + 1, int(y.max()) - top + LAGS + 1
     at = (y - top) * width + (x - left)
@@ -142,6 +156,20 @@ def inside_image(key: Key, shift: NDArray[np.intp], size_px: tuple[int, int]) ->
     low = (int(key.x.min()) + int(shift[0]), int(key.y.min()) + int(shift[1]))
     high = (int(key.x.max()) + int(shift[0]), int(key.y.max()) + int(shift[1]))
     return min(low) >= 0 and high[0] < size_px[0] and high[1] < size_px[1]
+
+
+def seen_through(key: Key, W: Floats) -> Floats:
+    """W (3, 3) as fitted, without what the drawing's blur does to it.
+
+    Through W = 1 + E the drawing's round blur is seen skewed, by v (A A' - 1), A the linear part of
+    W; the camera's is round at any pose. A fit takes the difference for E, less by the share that
+    ``pull`` says.
+    """
+    A = W[:2, :2] - W[:2, 2:] * W[2, :2]
+    S = key.template.blur.variance_px2 * (A @ A.T - np.eye(2))
+    out = W.ravel().copy()
+    out[:GEOMETRY] -= key.pull @ S[[0, 0, 1], [0, 1, 1]]
+    return out.reshape(3, 3)
 
 
 def change_of_shape(W: Floats) -> float:

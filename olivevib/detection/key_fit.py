@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Bools, Floats, Grey
-from olivevib.detection.key import GEOMETRY, LIGHT, Key
+from olivevib.detection.key import GEOMETRY, LIGHT, Key, seen_through
 from olivevib.detection.pixels import Singles
 from olivevib.detection.refine import CLEAR, LEAST_GAIN, MOVED_PX, middle
 
@@ -262,7 +262,7 @@ def _result(batch: KeyBatch, level: Singles, state: _State, last: _Pass, settled
     good = settled & np.isfinite(state.W).all(axis=(1, 2)) & (state.light[:, 3] > LEAST_GAIN)
     inverse = np.linalg.inv(np.where(good[:, None, None], last.A, np.eye(UNKNOWNS)))
     return KeyFits(
-        W=state.W,
+        W=np.stack([seen_through(*of) for of in zip(batch.keys, state.W, strict=True)]),
         covariance=np.stack(
             [
                 _covariance(*of)

@@ -29,7 +29,7 @@ LEAST_GAIN = 4.0  # grey levels between dark and white
 CLEAR = 0.5  # weight above which a pixel counts as not covered
 MOVED_PX = 0.02  # a pass that moves no cornerstone farther is the last: the next is quadratic
 ROUGH_PX = 0.1  # the same of a first, coarse fit
-PASSES = 8
+PASSES = 14  # light that starts on a covered marker takes ten to let go of the cover
 ENOUGH = 500  # residuals that give the scale of the weights
 LIGHT_ROUNDS = 6  # of robust weights and light in turn
 

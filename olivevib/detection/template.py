@@ -149,7 +149,7 @@ def draw_template(
     )
     level = _along(still, blur, samples)
     parts = [level, _slope(level, 0, samples), _slope(level, 1, samples)]
-    parts += _by_variances(level, samples) if moments else _by_blur(level, still, blur, samples)
+    parts += by_variances(level, samples) if moments else _by_blur(level, still, blur, samples)
     texture = np.asarray(cv2.merge(parts), dtype=np.float32)
     moving = blur.path_px > LEAST_PATH_PX and not moments
     return Template(texture, origin, H, blur, samples, moving)
@@ -285,7 +285,7 @@ def _path_slope(path: Floats, axis: int) -> NDArray[np.float32]:
     return np.asarray((more - less) / 2, dtype=np.float32)
 
 
-def _by_variances(level: NDArray[np.float32], samples: int) -> list[NDArray[np.float32]]:
+def by_variances(level: NDArray[np.float32], samples: int) -> list[NDArray[np.float32]]:
     """Derivatives by further variances: ½ xx, xy, ½ yy."""
     second = np.array([1.0, -2.0, 1.0]) * samples**2
     one = np.array([1.0])
