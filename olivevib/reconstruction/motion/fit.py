@@ -43,7 +43,7 @@ from olivevib.reconstruction.motion.types import (
 )
 from olivevib.reconstruction.motion.wander import growth_of, pace_of, weigh_paces
 
-DRAWING_SHARE = 6e-3  # of a row time: a fitted drawing tells a slant 0.2 % (50 px) to 0.6 % amiss
+DRAWING_SHARE = 1e-3  # of a row time: so well, down to 32 px, a fitted drawing tells a slant
 NEAR_S = 4e-3  # sigma of an offset that a fit found a valley away from its start
 WORSE = 1.3  # noise or chi2 above which a wandering speed is looked for
 
