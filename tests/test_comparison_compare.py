@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -83,6 +85,22 @@ def test_without_the_exposure_mean_the_gain_is_wrong_as_known():
     optical, accelerometer, _ = scene(2)
     c = compare(optical, accelerometer, 1, "trunk", ComparisonSettings(exposure_s=0.0))
     assert c.gain - 1 == pytest.approx(np.sinc(25 * EXPOSURE) - 1, abs=0.01)
+
+
+def test_a_localiser_that_tells_less_than_the_mean_is_given_its_share_and_its_sigma():
+    optical, accelerometer, _ = scene(2)
+    less = Samples(optical.t_s, 0.97 * optical.values, "displacement", "mm", optical.axes)
+    asked = []
+
+    def localised(f_hz):
+        asked.append(f_hz)
+        return 0.97, 0.01
+
+    plain = compare(less, accelerometer, 1, "trunk", SETTINGS)
+    told = compare(less, accelerometer, 1, "trunk", replace(SETTINGS, localised=localised))
+    assert asked == [pytest.approx(25.0, abs=0.1)]
+    assert plain.gain == pytest.approx(0.97 * told.gain, rel=1e-4)
+    assert told.gain_sigma == pytest.approx(np.hypot(plain.gain_sigma / 0.97, 0.01), rel=0.02)
 
 
 def test_a_wrong_scale_differs_and_says_by_how_much():

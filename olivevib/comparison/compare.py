@@ -64,6 +64,7 @@ def compare(
         return empty.no_overlap(camera_s, motion)
     tick(1, 4, "lines of the accelerometer")
     lines = sensor_lines(sensor, 1.5 * settings.corner_hz)
+    motion, share_sigma = _localised(motion, lines, settings)
     tick(2, 4, "lag between the clocks")
     work = _Work(camera_s, camera_mm, motion, lines, settings, missing, views)
     lag = work.coarse(limits)
@@ -76,6 +77,7 @@ def compare(
         clock = work.by_views(seen, clock)
     elif lines.fit is not None:
         clock = with_local_noise(seen, clock, work.line_hz)
+    clock = _with_gain_sigma(clock, share_sigma)
     rival = rival_of(work.refined, lag, clock, seen.mm, borne_out)
     return _comparison(empty, work, lag, seen, clock, rival, work.differences(sensor, clock))
 
@@ -88,6 +90,26 @@ def _axes_that_are(sensor: Samples) -> tuple[Samples, int]:
     values = np.where(missing, 0.0, sensor.values)
     whole = Samples(sensor.t_s, values, sensor.quantity, sensor.unit, sensor.axes)
     return whole, int(missing.sum())
+
+
+def _localised(
+    motion: SensorMotion, lines: LineFit, settings: ComparisonSettings
+) -> tuple[SensorMotion, float]:
+    """The motion as the camera's localiser tells it at the sensor's line, and sigma of the share.
+
+    Source: the table of detection/exposure_gain.
+    """
+    if settings.localised is None or lines.fit is None:
+        return motion, 0.0
+    share, sigma = settings.localised(float(lines.fit.f_hz[0]))
+    return replace(motion, share=share), sigma
+
+
+def _with_gain_sigma(clock: ClockFit, share_sigma: float) -> ClockFit:
+    """What the localiser leaves open of an amplitude, the gain leaves open too."""
+    more = np.zeros((6, 6))
+    more[2, 2] = (clock.gain * share_sigma) ** 2
+    return replace(clock, covariance=clock.covariance + more)
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ class SensorMotion:
 
     usable: limits of the part that ends do not disturb; gaps (G, 2): parts to keep away from.
     resampled: the sensor's stamps were uneven and a spline carried them to an even grid.
+    share: of the mean over an exposure that the camera's localiser tells.
     """
 
     start_s: float
@@ -40,6 +41,7 @@ class SensorMotion:
     resampled: bool
     spline: Any  # scipy CubicSpline of the displacement (3 axes)
     integral: Any
+    share: float = 1.0
 
     def usable(self, q_s: Floats, exposure_s: float) -> Bools:
         """Which instants lie inside the undisturbed part and away from gaps."""
@@ -50,18 +52,18 @@ class SensorMotion:
         return np.asarray(good)
 
     def seen(self, q_s: Floats, exposure_s: float) -> Floats:
-        """Displacement (N, 3) averaged over the exposure about each instant."""
-        if exposure_s == 0:
-            return np.asarray(self.spline(q_s))
-        half = exposure_s / 2
-        return np.asarray((self.integral(q_s + half) - self.integral(q_s - half)) / exposure_s)
+        """Displacement (N, 3) as it is localised in an exposure about each instant."""
+        return self._over(self.spline, self.integral, q_s, exposure_s)
 
     def speed(self, q_s: Floats, exposure_s: float) -> Floats:
         """Time derivative (N, 3) of ``seen``, mm/s."""
+        return self._over(self.spline.derivative(), self.spline, q_s, exposure_s)
+
+    def _over(self, value: Any, integral: Any, q_s: Floats, exposure_s: float) -> Floats:
         if exposure_s == 0:
-            return np.asarray(self.spline(q_s, 1))
-        half = exposure_s / 2
-        return np.asarray((self.spline(q_s + half) - self.spline(q_s - half)) / exposure_s)
+            return np.asarray(value(q_s))
+        mean = (integral(q_s + exposure_s / 2) - integral(q_s - exposure_s / 2)) / exposure_s
+        return np.asarray(self.share * mean)
 
 
 def sensor_motion(sensor: Samples, corner_hz: float) -> SensorMotion:

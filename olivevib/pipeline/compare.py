@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from olivevib.comparison import Comparison, ComparisonSettings, View
+from olivevib.comparison import Comparison, ComparisonSettings, Localised, View
 from olivevib.comparison import compare as compare_records
+from olivevib.detection.exposure_gain import exposure_gain
 from olivevib.errors import Caution, InputError, OlivevibError, UsageError
 from olivevib.files.accelerometer import (
     AccelerometerRecord,
@@ -135,13 +136,35 @@ def compare_sensor(
     marker = -1 if sensor.marker is None else sensor.marker
     views: tuple[View, ...] | None
     if trajectory.method == "continuous":  # the fit has given back what the exposure took
-        settings, views = ComparisonSettings(), marker_views(trial, trajectory, marker)
+        views = marker_views(trial, trajectory, marker)
+        settings = ComparisonSettings(localised=_localised(trial, marker))
         fit = trial.reconstruction.motion if trial.reconstruction else None
         point = point if fit is None else between(point, *interval_s(fit))
     else:
         exposure_s = (trial.settings.cameras.left.exposure_ms or 0.0) * 1e-3
-        settings, views = ComparisonSettings(exposure_s=exposure_s), None
+        localised = _localised(trial, marker) if exposure_s else None
+        settings, views = ComparisonSettings(exposure_s, localised), None
     return compare_records(point, _three_axes(record), marker, sensor.file, settings, tick, views)
+
+
+def _localised(trial: Trial, marker: int) -> Localised | None:
+    """What this marker's localiser tells of the mean over the left camera's exposure.
+
+    None where no exposure is stated or no track is kept.
+    """
+    exposure_s, tracks = (trial.settings.cameras.left.exposure_ms or 0.0) * 1e-3, trial.tracks
+    track = next((t for t in tracks.of("left") if t.id == marker), None) if tracks else None
+    if track is None or not exposure_s:
+        return None
+    seen = track.centre_px[np.isfinite(track.centre_px).all(axis=1)]
+    amplitude_px = float(np.sqrt(2 * np.sum(np.var(seen, axis=0)))) if len(seen) else 0.0
+
+    def share(f_hz: float) -> tuple[float, float]:
+        found = exposure_gain(f_hz, exposure_s, amplitude_px, track.localiser)
+        mean = float(np.sinc(f_hz * exposure_s))
+        return (1.0, 1.0 - mean) if found is None else (found.gain / mean, found.sigma / mean)
+
+    return share
 
 
 def _three_axes(record: AccelerometerRecord) -> Samples:
