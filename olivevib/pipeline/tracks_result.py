@@ -142,6 +142,7 @@ def _record(trial: Trial, camera: _Recorded) -> CameraRecord:
         row_time_s=row_time,
         row_time_sigma_s=row_time_sigma,
         row_time_source=source,
+        turn_deg=camera.info.rotation_deg,
     )
 
 

@@ -28,7 +28,9 @@ class CameraRecord:
 
     stamp_kind: "container", "file" or "slots" (AVI: made up from the rate); method: how the clock
     fit took the stamps ("line" or "stamps"); row_time_s signed per raw sensor row, row_time_source
-    "unknown" when taken as zero.
+    "unknown" when taken as zero; turn_deg: how far a player would turn the picture
+    counter-clockwise: points and rows are those of the stored picture, never turned, flipped,
+    cropped or scaled.
     """
 
     video: str
@@ -46,6 +48,7 @@ class CameraRecord:
     row_time_s: float
     row_time_sigma_s: float
     row_time_source: str
+    turn_deg: int = 0
 
 
 @dataclass(frozen=True)
