@@ -5,10 +5,11 @@ import pytest
 from rendered_markers import Canvas, Look, pose
 
 from olivevib.detection import Detector
+from olivevib.detection.blur import Blur
 from olivevib.detection.key import make_key
 from olivevib.detection.key_fit import batches_of, fit_keys
 from olivevib.detection.pixels import marker_pixels
-from olivevib.detection.template import Blur, card
+from olivevib.detection.template import card
 from olivevib.geometry import apply_homography
 from olivevib.marker import load_library
 from olivevib.tracking import Tracker

@@ -10,10 +10,11 @@ import pytest
 from rendered_markers import Canvas, Look, cover, dapple, motion, pose, shadow_edge
 from test_detection_paper import LIBRARY, PLACES, places
 
+from olivevib.detection.blur import Blur
 from olivevib.detection.card_fit import blurred_pixels, fit_card
 from olivevib.detection.fitted_points import fitted_points
 from olivevib.detection.noise import autocorrelation, edge_noise, noise_covariance
-from olivevib.detection.template import Blur, card, draw_template
+from olivevib.detection.template import card, draw_template
 from olivevib.detection.template_reader import TemplateReader
 from olivevib.files.prints import marker_modules
 from olivevib.geometry import apply_homography, homography

@@ -10,11 +10,12 @@ from rendered_markers import Canvas, Look, pose
 from scipy.special import ndtr
 from test_detection_paper import LIBRARY, PLACES, no_marker, places, scene
 
+from olivevib.detection.blur import PIXEL_VARIANCE, Blur
 from olivevib.detection.card_fit import fit_card
 from olivevib.detection.fitted_points import point_jacobian
 from olivevib.detection.pixels import marker_pixels
 from olivevib.detection.refine import fit_template
-from olivevib.detection.template import PIXEL_VARIANCE, Blur, card, draw_template
+from olivevib.detection.template import card, draw_template
 from olivevib.detection.template_reader import TemplateReader
 from olivevib.geometry import apply_homography, homography
 

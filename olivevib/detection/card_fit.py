@@ -8,18 +8,11 @@ import numpy as np
 
 from olivevib.arrays import Floats, Grey
 from olivevib.detection.bend import Bend
+from olivevib.detection.blur import LEAST_PATH_PX, Blur
 from olivevib.detection.pixels import Pixels, Singles, marker_pixels
 from olivevib.detection.refine import Fit, approach, fit_template
 from olivevib.detection.smear import further_blur, motion_of, rounder
-from olivevib.detection.template import (
-    COARSE,
-    LEAST_PATH_PX,
-    MOSAIC,
-    REACH,
-    Blur,
-    draw_template,
-    module_px,
-)
+from olivevib.detection.template import COARSE, MOSAIC, REACH, draw_template, module_px
 from olivevib.detection.uneven import closed_light, template_light
 from olivevib.geometry import apply_homography
 from olivevib.marker import MarkerLayout

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Floats, Grey
+from olivevib.detection.blur import LEAST_PATH_PX, Blur
 from olivevib.detection.card_fit import EVEN, REDRAWN_PX2, SHARP, plausible
 from olivevib.detection.detection import Detection
 from olivevib.detection.fitted_points import image_homography, point_images
@@ -22,7 +23,7 @@ from olivevib.detection.key import Key, change_of_shape, inside_image, make_key
 from olivevib.detection.key_fit import KeyBatch, KeyFits, batches_of, fit_keys
 from olivevib.detection.pixels import Singles
 from olivevib.detection.search import Scene, patch_of, search, smeared_start
-from olivevib.detection.template import COARSE, LEAST_PATH_PX, Blur, draw_template
+from olivevib.detection.template import COARSE, draw_template
 from olivevib.detection.template_reader import SURE, Found
 from olivevib.geometry import homography
 from olivevib.marker import MarkerLibrary

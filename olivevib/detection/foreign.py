@@ -9,11 +9,12 @@ import cv2
 import numpy as np
 
 from olivevib.arrays import Floats, Grey
+from olivevib.detection.blur import Blur
 from olivevib.detection.card_fit import fit_card
 from olivevib.detection.codes import read_modules, sample_points
 from olivevib.detection.detection import Detection
 from olivevib.detection.softcode import MASK
-from olivevib.detection.template import Blur, card
+from olivevib.detection.template import card
 from olivevib.detection.template_reader import SURE, Found, fitted_detection, sound
 from olivevib.geometry import (
     apply_homography,

@@ -14,19 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Bools, Floats
+from olivevib.detection.blur import Blur, by_variances
 from olivevib.detection.noise import LAGS
 from olivevib.detection.pixels import Pixels, Singles, marker_pixels
 from olivevib.detection.refine import only
 from olivevib.detection.search import Patch, patch_of
-from olivevib.detection.template import (
-    FOLLOWED,
-    REACH,
-    Blur,
-    Template,
-    by_variances,
-    draw_template,
-    module_px,
-)
+from olivevib.detection.template import FOLLOWED, REACH, Template, draw_template, module_px
 from olivevib.marker import MarkerLayout
 
 FLAT = 0.02  # of the steepest slope, squared: 1.5 px from an edge

@@ -10,14 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from olivevib.arrays import Floats, Grey
+from olivevib.detection.blur import Blur
 from olivevib.detection.pixels import Singles
-from olivevib.detection.template import (
-    COARSE,
-    Blur,
-    Template,
-    draw_template,
-    module_stretches_px,
-)
+from olivevib.detection.template import COARSE, Template, draw_template, module_stretches_px
 from olivevib.marker import MarkerLayout
 
 STEEP = 0.57  # share of its box that a marker fills, below which a search needs a mask

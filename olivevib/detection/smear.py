@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from olivevib.arrays import Floats
-from olivevib.detection.template import Blur
+from olivevib.detection.blur import Blur
 
 VARIANCES_PX2 = (0.15, 6.0)  # round blur that is believed
 ELONGATED_PX2 = 0.3  # difference of the blur's two variances that is a motion

@@ -13,6 +13,7 @@ import numpy as np
 
 from olivevib.arrays import Bools, Floats, Grey, Ints
 from olivevib.detection.bend import Wrapped
+from olivevib.detection.blur import Blur
 from olivevib.detection.candidates import dark_passes, fine_bars
 from olivevib.detection.card_fit import EVEN, CardFit, fit_card
 from olivevib.detection.covers import without_cover
@@ -22,7 +23,7 @@ from olivevib.detection.hypotheses import Frames, frame_hypotheses, joined
 from olivevib.detection.refine import Fit
 from olivevib.detection.settings import DetectionSettings
 from olivevib.detection.softcode import SoftMatch, SoftReader
-from olivevib.detection.template import Blur, card
+from olivevib.detection.template import card
 from olivevib.detection.wrapped import fit_wrapped
 from olivevib.geometry import apply_homography
 from olivevib.marker import MarkerLibrary

@@ -13,12 +13,12 @@ import numpy as np
 
 from olivevib.arrays import Floats, Grey
 from olivevib.detection.bend import Bend, Wrapped, depths_px
+from olivevib.detection.blur import Blur
 from olivevib.detection.card_fit import CardFit, blurred_pixels, plausible
 from olivevib.detection.pixels import Singles
 from olivevib.detection.refine import fit_template
 from olivevib.detection.smear import rounder
 from olivevib.detection.template import (
-    Blur,
     Template,
     draw_template,
     module_px,
