@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from test_motion_parts import anchor_of, scene
 
+from olivevib.reconstruction.continuous import decided
 from olivevib.reconstruction.motion import Anchor, MotionSettings, fit_motion, steady_ends
 from olivevib.reconstruction.motion.decide import Facts, decide, zone
 from olivevib.reconstruction.motion.evaluate import phase_of
@@ -287,6 +288,19 @@ def test_an_offset_that_was_searched_in_vain_confirms_nothing():
     sure = decide(replace(lost, table=far), fit.anchor, MotionSettings())
     assert sure.status is LineStatus.CONFIRMED
     assert decide(facts, fit.anchor, MotionSettings()).status is LineStatus.CONFIRMED
+    slow = replace(far, f_hz=np.array([30.66, 29.31]))  # a wrong one led by 1294 in 4,437 trials
+    alike = decide(replace(lost, table=slow), fit.anchor, MotionSettings())
+    assert alike.status is LineStatus.SUPPORTED
+    assert "near the frame rate" in alike.reasons[0]
+    known = decide(replace(facts, table=slow), fit.anchor, MotionSettings())
+    assert known.status is LineStatus.CONFIRMED
+
+
+def test_a_fit_about_which_the_pictures_scatter_far_more_than_noise_stands_for_no_record():
+    """As where rest and start-up of a short recording are taken for the steady part."""
+    _, fit = fitted(scene(11.3))
+    assert decided(fit)
+    assert not decided(replace(fit, noise_scale=120.0))
 
 
 def test_two_kinds_of_candidates_that_nearly_coincide_are_both_tried():

@@ -76,9 +76,12 @@ def _no_surer_than_it_fits(fit: MotionFit) -> MotionFit:
     """The fit; as ambiguous where its best branch does not describe the pictures."""
     if decided(fit) or fit.status not in DECIDED:
         return fit
+    misfit = f"misfit {fit.chi2:.3g} times their scatter"
+    if fit.chi2 <= MOST_CHI2:
+        misfit = f"they scatter {fit.noise_scale:.0f} times more about it than they should"
     why = (
-        f"No motion of one frequency describes the pictures (misfit {fit.chi2:.3g} times their "
-        "scatter): the frequency is not decided."
+        f"No motion of one frequency describes the pictures ({misfit}): the frequency is not "
+        "decided."
     )
     return replace(fit, status=LineStatus.AMBIGUOUS, reasons=(why,))
 

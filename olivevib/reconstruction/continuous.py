@@ -12,6 +12,7 @@ from olivevib.vibration.types import LineStatus
 
 FINER = 8  # grid points a frame period
 MOST_CHI2 = 3.0
+MOST_SCATTER = 20.0  # of the pictures about any motion like it, over what their drawings tell
 DECIDED = (LineStatus.DIRECT, LineStatus.CONFIRMED, LineStatus.SUPPORTED)
 
 
@@ -19,7 +20,8 @@ def decided(fit: MotionFit | None) -> bool:
     """Whether one motion was found that may stand for the record.
 
     A fit that leaves more than three times the pictures' scatter is not this motion, whatever its
-    branches say of each other.
+    branches say of each other; nor is one about which they scatter far more than noise, as they do
+    where rest and start-up are taken for the steady part.
     """
     return (
         fit is not None
@@ -27,6 +29,7 @@ def decided(fit: MotionFit | None) -> bool:
         and fit.kind in ("steady", "wandering")
         and fit.status in DECIDED
         and fit.chi2 <= MOST_CHI2
+        and fit.noise_scale <= MOST_SCATTER
     )
 
 

@@ -81,6 +81,12 @@ def zone(f_hz: float, facts: Facts, harmonic: int = 1) -> str:
     return collision(f_hz, facts, harmonic) if step else ""
 
 
+def near_rate(f_hz: float, rate_hz: float) -> bool:
+    """Whether a line is seen as slow as sway, near a multiple of the frame rate."""
+    times = round(f_hz / rate_hz)
+    return times > 0 and abs(f_hz - rate_hz * times) < SWAY_HZ
+
+
 def collision(f_hz: float, facts: Facts, harmonic: int = 1) -> str:
     """What the harmonic of f_hz shows the same apparent frequency as, unresolved, or nothing."""
     rate, f = facts.rate_hz, harmonic * f_hz
@@ -151,7 +157,7 @@ def _status(
 
 def _doubts(facts: Facts, settings: MotionSettings) -> list[str]:
     doubts = []
-    lead, f = facts.table.lead, float(facts.table.f_hz[0])
+    lead, f, rate = facts.table.lead, float(facts.table.f_hz[0]), facts.rate_hz
     alike = collision(f, facts)
     asked = COLLISION_LEAD if alike else CONFIRMED_LEAD
     if lead < asked:
@@ -165,7 +171,10 @@ def _doubts(facts: Facts, settings: MotionSettings) -> list[str]:
         doubts.append(f"the pictures scatter {facts.noise_scale:.1f} times more than they should")
     if facts.stray:
         doubts.append(facts.stray)
-    if facts.offset_lost and lead < LOST_LEAD:
+    if facts.offset_lost and near_rate(f, rate):
+        what = "so near the frame rate the line looks like the slow sway that would show"
+        doubts.append(f"{what} by how much the cameras are out of step")
+    elif facts.offset_lost and lead < LOST_LEAD:
         doubts.append("no slow sway shows by how much the cameras are out of step")
     low, high = settings.band_hz
     if not low <= f <= high:
