@@ -55,7 +55,7 @@ def test_txt_blocks_end_at_gaps() -> None:
 def test_h5_opens_in_xarray_without_our_code(tmp_path: Path, engine: str) -> None:
     trajectory = replace(make_trajectory(n=400), fits=(make_fit(7),))
     facts = ExportFacts("T04", make_rig(), (make_spectrum((7, 2, 31)),))
-    path = tmp_path / "new folder" / "a.h5"
+    path = tmp_path / "a.h5"
     export(trajectory, "h5", path, facts)
     with xr.open_dataset(path, engine=engine) as data:
         assert data["xyz_mm"].dims == ("time", "marker", "axis")

@@ -6,7 +6,7 @@ import argparse
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from olivevib import values
 from olivevib.cli.console import Console
@@ -78,14 +78,15 @@ def export(arguments: argparse.Namespace, console: Console) -> int:
 
     trial = trial_of(arguments.trial, console)
     ids = values.id_list(arguments.markers) or None
-    if arguments.output == "-":
-        found = pipeline.export(trial, arguments.to, sys.stdout.buffer, ids)
-        return 3 if console.cautions(found) else 0
-    target = (
-        Path(arguments.output) if arguments.output else pipeline.export_place(trial, arguments.to)
-    )
+    target: Path | BinaryIO = pipeline.export_place(trial, arguments.to)
+    if arguments.output:
+        target = sys.stdout.buffer if arguments.output == "-" else Path(arguments.output)
     found = pipeline.export(trial, arguments.to, target, ids)
-    _out(str(target))
+    if isinstance(target, Path):
+        _out(str(target))
+    words = pipeline.export_words(trial, arguments.to, ids)
+    if words:
+        console.say(f"{arguments.to}: {words}")
     return 3 if console.cautions(found) else 0
 
 

@@ -6,7 +6,7 @@ from olivevib.pipeline.compare import compare, keep_preset
 from olivevib.pipeline.measure import analyse, reconstruct
 from olivevib.pipeline.new import NewTrial, new_trial
 from olivevib.pipeline.new_checks import Fault, faults, unsaid
-from olivevib.pipeline.outputs import export, export_place, report
+from olivevib.pipeline.outputs import export, export_place, export_words, report
 from olivevib.pipeline.run import Outcome, run, run_stage
 from olivevib.pipeline.sensor_plan import SensorPlan, sensor_plans
 from olivevib.pipeline.track import track
@@ -23,6 +23,7 @@ __all__ = [
     "compare",
     "export",
     "export_place",
+    "export_words",
     "faults",
     "keep_preset",
     "new_trial",

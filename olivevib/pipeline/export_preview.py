@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olivevib.files.exports import only_markers
+from olivevib.files.exports import EVEN, even_part, only_markers
 from olivevib.pipeline.outputs import export
 from olivevib.trial import Trial
 
@@ -50,6 +50,8 @@ def export_preview(trial: Trial, to: str, ids: tuple[int, ...] | None = None) ->
     if path is None:
         raise trial.need("reconstruct")
     path = only_markers(path, ids)
+    if to in EVEN:
+        path = even_part(path).trajectory
     text = out.getvalue()[:_HEAD].decode("utf-8", "replace").splitlines()[:LINES]
     kept = tuple(int(i) for i in path.ids)
     unseen = np.asarray(~np.isfinite(path.xyz_mm).all(axis=2))

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from olivevib.errors import Caution, InputError
-from olivevib.files.exports import ExportFacts
+from olivevib.files.atomic import as_input_error
+from olivevib.files.exports import EVEN, ExportFacts, even_part, only_markers
 from olivevib.files.exports import export as write_export
 from olivevib.progress import Tick, silent
 from olivevib.trial import Condition, Trial
@@ -43,8 +44,25 @@ def export(
     if trajectory is None:
         raise trial.need("reconstruct")
     facts = ExportFacts(trial.name, sound.rig, tuple(sound.spectra.values()))
+    if isinstance(target, Path) and target.parent == export_place(trial, to).parent:
+        _make(target.parent)
     write_export(trajectory, to, target, facts, ids)
     return tuple(_export_cautions(sound))
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise as_input_error(error, folder) from error
+
+
+def export_words(trial: Trial, to: str, ids: tuple[int, ...] | None = None) -> str:
+    """What a file of this format does not hold of the paths, and its rate; empty: it holds all."""
+    trajectory = trial.readable().trajectory
+    if to not in EVEN or trajectory is None:
+        return ""
+    return even_part(only_markers(trajectory, ids)).words
 
 
 def _export_cautions(trial: Trial) -> Iterator[Caution]:

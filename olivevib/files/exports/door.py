@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from olivevib.errors import UsageError
-from olivevib.files.atomic import as_input_error, replacing
+from olivevib.files.atomic import replacing
 from olivevib.files.exports.facts import ExportFacts, only_markers
 from olivevib.reconstruction.trajectory import Trajectory
 
@@ -31,6 +31,7 @@ _MODULES = {
     "parquet": "parquet",
 }
 FORMATS: tuple[str, ...] = tuple(_MODULES)
+EVEN = ("c3d", "trc")  # one rate for all rows: they hold ``even_part`` of the path
 
 
 def export(
@@ -43,7 +44,8 @@ def export(
     """Write the paths of the markers ``ids`` (None: all) as ``to`` into a file or binary stream.
 
     A file appears whole or not at all; the same trajectory gives the same bytes. Gaps stay gaps.
-    Raises UsageError for an unknown format or id, InputError where the disk refuses the file.
+    Raises UsageError for an unknown format or id, InputError where the disk refuses the file or its
+    folder is not there.
     """
     writer = _writer(to)
     chosen = only_markers(trajectory, ids)
@@ -70,9 +72,5 @@ def _writer(to: str) -> Writer:
 
 def _write_whole(path: Path, write: Callable[[BinaryIO], None]) -> None:
     """Write beside ``path``, sync, rename: a reader sees the old file or the new one."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise as_input_error(error, path) from error
     with replacing(path) as beside, beside.open("wb") as out:
         write(out)

@@ -81,9 +81,3 @@ def only_markers(trajectory: Trajectory, ids: tuple[int, ...] | None) -> Traject
     chosen = {name: getattr(trajectory, name)[:, pick] for name in columns}
     fits = tuple(fit for fit in trajectory.fits if fit.id in ids)
     return replace(trajectory, ids=trajectory.ids[pick], fits=fits, **chosen)
-
-
-def frame_rate_hz(trajectory: Trajectory) -> float:
-    """The mean frame rate, Hz; 0 for fewer than two frames."""
-    t_s = trajectory.t_s
-    return float((t_s.size - 1) / (t_s[-1] - t_s[0])) if t_s.size > 1 else 0.0
