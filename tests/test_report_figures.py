@@ -16,7 +16,8 @@ from olivevib.report.figures import canvas
 from olivevib.report.figures.boxes import boxes
 from olivevib.report.figures.scene import _oblique
 from olivevib.report.figures.sensor import overlay_window
-from olivevib.report.figures.spectra import noise_floor, seen_at_hz
+from olivevib.report.figures.spectra import Band, _limits, noise_floor
+from olivevib.report.lines import folded_hz
 from olivevib.vibration import Deflection, LineStatus, MarkerResponse, Transmission
 
 IDS = [1, 4, 17]
@@ -37,8 +38,8 @@ def every(path) -> dict[str, str]:
     return {
         "motion": figures.time_series(path, NAMES, IDS, figures.whole(path)),
         "close": figures.time_series(path, NAMES, IDS, figures.Window(1.0, 2.0, close=True)),
-        "amplitude": figures.amplitude_spectra(spectrum, NAMES, IDS, 15.0),
-        "psd": figures.power_spectra(spectrum, NAMES, IDS, 15.0),
+        "amplitude": figures.amplitude_spectra(spectrum, NAMES, IDS, Band(15.0, 15.0)),
+        "psd": figures.power_spectra(spectrum, NAMES, IDS, Band(15.0, 15.0)),
         "frequency": figures.frequencies(spectrum, NAMES, 15.0),
         "orbits": figures.orbits(path, NAMES, IDS, 5.0),
         "scene": figures.scene(scene.rig(), path, NAMES),
@@ -120,8 +121,8 @@ def test_runs_cover_exactly_what_is_true():
 
 @pytest.mark.parametrize(("true_hz", "seen_hz"), [(12, 12), (25, 5), (35, 5), (31, 1), (15, 15)])
 def test_a_line_is_marked_where_the_frame_rate_folds_it(true_hz, seen_hz):
-    line = scene.line(LineStatus.CONFIRMED, float(true_hz))
-    assert seen_at_hz(line, 15.0) == pytest.approx(seen_hz)
+    assert folded_hz(float(true_hz), 15.0) == pytest.approx(seen_hz)
+    assert np.isnan(folded_hz(np.nan, 15.0))
 
 
 def test_noise_floor_is_that_of_the_noise_not_of_the_line():
@@ -131,6 +132,29 @@ def test_noise_floor_is_that_of_the_noise_not_of_the_line():
     expected = float(np.median(values[3:]))
     values[198:203] = 5.0
     assert noise_floor(f, values, 10.0, 0.05) == pytest.approx(expected, rel=0.1)
+
+
+def spectrum_of_a_fit(path):
+    """A spectrum that falls to rounding beside its line, as that of a fitted motion does."""
+    spectrum = scene.spectrum(path, [LineStatus.DIRECT] * 3)
+    beside = np.abs(spectrum.f_hz - 12.003) > 1.0
+    amplitude = np.where(beside[:, None, None], 1e-7, spectrum.amplitude)
+    return replace(spectrum, amplitude=amplitude, psd=amplitude**2)
+
+
+@pytest.mark.parametrize("draw", [figures.amplitude_spectra, figures.power_spectra])
+def test_a_fitted_motion_has_no_noise_floor_and_no_axis_below_its_sigma(path, draw):
+    """What the fitted curve leaves beside its line is rounding: it is no noise of a measurement."""
+    spectrum = spectrum_of_a_fit(path)
+    dotted = "stroke-dasharray:0.7,1.4"
+    samples = draw(spectrum, NAMES, IDS, Band(15.0, 15.0))
+    fitted = draw(spectrum, NAMES, IDS, Band(15.0, 15.0, fitted=True))
+    assert dotted in samples.replace(" ", "")
+    assert dotted not in fitted.replace(" ", "")
+    least = min(line.amplitude_sigma.min() for line in spectrum.lines)
+    drawn = _limits(spectrum, spectrum.amplitude, IDS, Band(15.0, 15.0, fitted=True), least)
+    assert drawn[0] == pytest.approx(0.1 * least)
+    assert _limits(spectrum, spectrum.amplitude, IDS, Band(15.0, 15.0), least)[0] < 1e-6
 
 
 def test_distances_of_a_rigid_pair_have_no_spread(path):

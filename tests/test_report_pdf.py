@@ -133,6 +133,17 @@ def test_the_spectrogram_shows_the_line_where_it_is_and_its_power():
     assert np.nanmax(one.power[:, middle]) == pytest.approx(np.sum(size**2) / 2, rel=0.15)
 
 
+def test_sway_does_not_take_the_ridge_of_a_spectrogram():
+    """Sway of 9 mm beside a line of 3 mm: the strongest frequency is that of the line."""
+    path = scene.trajectory([1, 2, 3], 8.0)
+    sway = 9.0 * np.sin(2 * np.pi * 1.0 * path.sample_t_s)
+    path = replace(path, xyz_mm=path.xyz_mm + sway[..., None])
+    shaken = slice(25, 50)
+    assert np.median(spectrogram(path, 3, 15.0).ridge_hz[shaken]) < 3.0
+    ridge = spectrogram(path, 3, 15.0, 2.5).ridge_hz[shaken]
+    assert np.abs(ridge - 12.003).max() < 0.5
+
+
 def test_lines_that_are_all_blind_leave_no_empty_figure():
     facts = page_facts(scene.content([1, 2, 17], LineStatus.BLIND, seconds=4.0))
     assert "frequency" not in facts["plates"]

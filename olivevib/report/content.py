@@ -7,18 +7,23 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from olivevib.comparison import Comparison
 from olivevib.errors import Caution
 from olivevib.geometry import StereoRig
 from olivevib.reconstruction.trajectory import Trajectory
 from olivevib.report.clean import clean
 from olivevib.report.decay import FreeDecay, free_decays
+from olivevib.report.lines import folded_hz
 from olivevib.report.transfer import Transmissibility, surveyed
 from olivevib.signals import fit_stamps
 from olivevib.tracking import Track
 from olivevib.trial.records.calibration import CalibrationRecord
 from olivevib.vibration import Line, Phase, Spectrum, Survey, Vibration
+from olivevib.vibration.verdict import SWAY_HZ
 
+BAND = 4.0  # times the highest line: what of a spectrum is worth drawing
 _ROWS = (  # what of a trajectory has one row an instant
     *("t_s", "sample_t_s", "xyz_mm", "sigma_xyz_mm", "covariance_mm2"),
     *("rotation_rad", "sigma_rotation_rad", "state", "epipolar_px"),
@@ -30,7 +35,8 @@ class ReportContent:
     """Everything that one report shows.
 
     record: sections of trial.toml (session, tree, machine, markers, …) as plain values. summary:
-    the content of ``show --json``. places: words for each marker id. provenance: versions,
+    the content of ``show --json``. places: words for each marker id. sway_hz: slower motion counts
+    as sway. next_time: what would make the frequency surer in another trial. provenance: versions,
     settings and hashes as plain text, ``command`` among them. recordings: for left and right what
     the stored recording says of itself (rate, jitter, drops).
     """
@@ -48,6 +54,8 @@ class ReportContent:
     vibration: Vibration | None = None
     comparisons: tuple[Comparison, ...] = ()
     cautions: tuple[Caution, ...] = ()
+    sway_hz: float = SWAY_HZ
+    next_time: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def marker_name(self, marker_id: int, longest: int = 28) -> str:
@@ -123,6 +131,13 @@ class ReportContent:
         """Half the frame rate, above which frequencies fold, Hz."""
         rate = self.recordings.get("left", {}).get("rate_hz")
         return float(rate) / 2 if isinstance(rate, float) and self.continuous else self.half_rate_hz
+
+    @property
+    def shown_hz(self) -> float:
+        """How far spectra are drawn: four times the highest line, at most to their end."""
+        seen = [folded_hz(line.f_hz, self.half_rate_hz) for line in self.lines().values()]
+        highest = max((f for f in seen if np.isfinite(f)), default=np.inf)
+        return float(min(self.half_rate_hz, BAND * highest))
 
     @property
     def survey(self) -> Survey | None:

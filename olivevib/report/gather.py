@@ -18,6 +18,8 @@ from olivevib.report.season import SeasonEntry
 from olivevib.report.season_table import trial_rows
 from olivevib.trial.stages import STAGES
 from olivevib.trial.summary import summary
+from olivevib.vibration import SamplingFacts
+from olivevib.vibration.verdict import SWAY_HZ
 
 if TYPE_CHECKING:
     from olivevib.trial import Trial
@@ -29,7 +31,8 @@ _RECORD = ("session", "tree", "machine", "outcome", "markers", "cameras", "accel
 
 def content_of(trial: Trial) -> ReportContent:
     """Everything that the report of ``trial`` shows; None and () where a stage has not run."""
-    settings, tracks = trial.settings, trial.tracks
+    settings, tracks, band = trial.settings, trial.tracks, trial.settings.vibration.band_hz
+    fit = trial.reconstruction.motion if trial.reconstruction else None
     return ReportContent(
         name=trial.name,
         record=_record(trial),
@@ -47,6 +50,8 @@ def content_of(trial: Trial) -> ReportContent:
             Caution(c.code, within(trial.folder, c.text), within(trial.folder, c.remedy))
             for c in trial.cautions
         ),
+        sway_hz=SamplingFacts(2 * SWAY_HZ, band_hz=band).sway_hz if band else SWAY_HZ,
+        next_time=() if fit is None else fit.next_time,
         provenance=provenance(trial),
     )
 

@@ -39,6 +39,12 @@ def candidates_text(candidates_hz: Sequence[float], chance: Sequence[float] = ()
     return " or ".join(listed) + "\u00a0Hz"
 
 
+def folded_hz(f_hz: float, half_rate_hz: float) -> float:
+    """Where a line of frequency f_hz shows up below half the sampling rate, Hz; NaN: not known."""
+    rate = 2 * half_rate_hz
+    return float(abs(f_hz - rate * np.round(f_hz / rate)))
+
+
 def describe(line: Line) -> str:
     """A line in a few words: ``12.003 ± 0.002 Hz (direct)``, or what stands against one."""
     if line.status is LineStatus.NONE:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from olivevib.progress import Tick, silent
-from olivevib.report import figures
+from olivevib.report import captions, figures
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
 from olivevib.report.lines import KNOWN, OPEN
@@ -65,18 +65,18 @@ def _space(content: ReportContent) -> Iterator[Job]:
     path, names, ids = content.shown_path, content.names(), seen_ids(content)
     rig, lines = content.rig, content.lines()
     if rig is not None:
-        yield ("paths", _SCENE, lambda: figures.scene(rig, path, names))
+        yield ("paths", captions.SCENE, lambda: figures.scene(rig, path, names))
     if path is None or not ids:
         return
     for group in _groups(ids, ROWS):
-        caption = _MOTION + (_FITTED if content.continuous else "")
+        caption = captions.MOTION + (captions.FITTED if content.continuous else "")
         yield ("motion", _once(caption, group, ids), _bound(
             figures.time_series, path, names, group, figures.whole(path), content.phases
         ))  # fmt: skip
     window, closest = _close(content, ids)
     if window is not None:
         each = "instants of the fitted motion" if content.continuous else "single frames"
-        caption = _CLOSE.format(length=number(window.end_s - window.start_s, 2), each=each)
+        caption = captions.CLOSE.format(length=number(window.end_s - window.start_s, 2), each=each)
         yield (
             "motion",
             caption,
@@ -85,12 +85,12 @@ def _space(content: ReportContent) -> Iterator[Job]:
     yield from _changing(content, ranked(content, ids))
     reach = figures.orbit_reach_mm(path, ids)
     for group in _groups(ids, figures.MOST_ACROSS):
-        caption = _once(_ORBITS.format(reach=number(reach, 3)), group, ids)
+        caption = _once(captions.ORBITS.format(reach=number(reach, 3)), group, ids)
         yield ("orbits", caption, _bound(figures.orbits, path, names, group, reach, lines))
     yield from body_jobs(content, ranked(content, ids))
     pairs = figures.pair_distances(path)
     if pairs:
-        yield ("distances", _DISTANCES, lambda: figures.distances(path, pairs, names))
+        yield ("distances", captions.DISTANCES, lambda: figures.distances(path, pairs, names))
 
 
 def _once(caption: str, group: Sequence[int], ids: Sequence[int]) -> str:
@@ -128,44 +128,50 @@ def ranked(content: ReportContent, ids: Sequence[int]) -> list[int]:
 
 def _changing(content: ReportContent, most: Sequence[int]) -> Iterator[Job]:
     """The spectrograms of the markers that move most."""
-    path, half, names = content.shown_path, content.half_rate_hz, content.names()
+    path, names = content.shown_path, content.names()
     assert path is not None
-    each = {i: figures.spectrogram(path, i, half) for i in sorted(most[:SPECTROGRAMS])}
+    sway, top = content.sway_hz, content.shown_hz
+    each = {i: figures.spectrogram(path, i, top, sway) for i in sorted(most[:SPECTROGRAMS])}
     found = {i: one for i, one in each.items() if one is not None and np.isfinite(one.power).any()}
     if found:
         yield (
             "spectrogram",
-            _SPECTROGRAM,
-            _bound(figures.spectrograms, found, names, content.phases),
+            captions.SPECTROGRAM.format(sway=number(sway, 3))
+            + (captions.TRUE if content.continuous else captions.FOLDED),
+            _bound(figures.spectrograms, found, names, content.phases, _axis(content)),
         )
 
 
 def _spectra(content: ReportContent) -> Iterator[Job]:
-    spectrum, names, half = content.displacement, content.names(), content.half_rate_hz
-    fold = content.fold_hz
+    spectrum, names, fold = content.displacement, content.names(), content.fold_hz
+    band = figures.Band(content.half_rate_hz, content.shown_hz, content.continuous)
     if spectrum is None or not spectrum.ids.size:
         return
     if any(line.status in (*KNOWN, *OPEN) for line in spectrum.lines):
-        yield ("frequency", _FREQUENCY, lambda: figures.frequencies(spectrum, names, fold))
+        yield ("frequency", captions.FREQUENCY, lambda: figures.frequencies(spectrum, names, fold))
     ids = _finite_ids(spectrum)
     for group in _groups(ids, ROWS):
-        words = _once(_AMPLITUDE + _window_words(spectrum, half), group, ids)
-        yield ("spectra", words, _bound(figures.amplitude_spectra, spectrum, names, group, half))
+        words = captions.AMPLITUDE + (captions.NO_FLOOR if content.continuous else captions.FLOOR)
+        words = _once(words + _window_words(spectrum, content), group, ids)
+        yield ("spectra", words, _bound(figures.amplitude_spectra, spectrum, names, group, band))
     acceleration = content.vibration.spectra.get("acceleration") if content.vibration else None
     if acceleration is not None:
         for group in _groups(_finite_ids(acceleration), 12):
-            job = _bound(figures.total_spectra, acceleration, names, group, half)
-            yield ("spectra", _ACCELERATION, job)
+            job = _bound(figures.total_spectra, acceleration, names, group, band)
+            yield ("spectra", captions.ACCELERATION, job)
     for group in _groups(_finite_ids(spectrum), 12):
-        job = _bound(figures.power_spectra, spectrum, names, group, half)
-        yield ("psd", _PSD + _window_words(spectrum, half), job)
+        job = _bound(figures.power_spectra, spectrum, names, group, band)
+        words = captions.PSD + (
+            captions.NO_FLOOR_AGAIN if content.continuous else " Dotted: noise floor."
+        )
+        yield ("psd", words + _window_words(spectrum, content), job)
     ratios = content.transmissibility
     if ratios is not None:
         job = _bound(figures.transmissibilities, ratios.ratios, names, ratios.reference)
-        yield ("transmissibility", _RATIOS, job)
+        yield ("transmissibility", captions.RATIOS, job)
     yield from response_jobs(content)
     if content.decays:
-        yield ("decay", _DECAY, _bound(figures.decays, content.decays, names))
+        yield ("decay", captions.DECAY, _bound(figures.decays, content.decays, names))
 
 
 def _finite_ids(spectrum: Spectrum | None) -> list[int]:
@@ -176,15 +182,34 @@ def _finite_ids(spectrum: Spectrum | None) -> list[int]:
     return sorted(int(i) for m, i in enumerate(spectrum.ids) if finite[:, m].any())
 
 
-def _window_words(s: Spectrum, half_hz: float) -> str:
+def _axis(content: ReportContent) -> str:
+    """What stands at the frequency axis of a spectrogram."""
+    return "frequency, Hz" if content.continuous else "as sampled, Hz"
+
+
+def _window_words(s: Spectrum, content: ReportContent) -> str:
     """How a spectrum was made: phase, window, bins, and where its axis ends."""
     span = f", {s.start_s:.2f} to {s.end_s:.2f} s" if np.isfinite(s.start_s + s.end_s) else ""
     return (
         f" Phase: {clean(s.phase, 20)}{span}; {clean(s.window, 20).capitalize()} window,"
         f" {number(s.resolution_hz, 3)} Hz between bins, noise bandwidth"
-        f" {number(s.enbw_bins, 3)} bins; axis up to {number(half_hz, 4)} Hz,"
-        " half the sampling rate."
+        f" {number(s.enbw_bins, 3)} bins; {_end_words(content)}."
     )
+
+
+def _end_words(content: ReportContent) -> str:
+    """Where the axis of a spectrum ends, and why there."""
+    half, shown = content.half_rate_hz, content.shown_hz
+    end = f"{number(half, 4)} Hz, half the sampling rate"
+    if content.continuous:
+        end = (
+            f"{number(half, 4)} Hz, half of the {number(2 * half, 4)} instants a second at which"
+            f" the fitted motion is evaluated (the cameras: {number(2 * content.fold_hz, 4)}"
+            " frames a second)"
+        )
+    if shown < half:
+        return f"drawn up to {number(shown, 3)} Hz, four times the highest line; it goes to {end}"
+    return f"axis up to {end}"
 
 
 def _quality(content: ReportContent) -> Iterator[Job]:
@@ -194,12 +219,12 @@ def _quality(content: ReportContent) -> Iterator[Job]:
     rows = figures.strips(content.tracks, path, names)
     for part in range(0, len(rows), STRIPS):
         job = _bound(figures.visibility, rows[part : part + STRIPS], part)
-        yield ("seen", _SEEN, job)
+        yield ("seen", captions.SEEN, job)
     if path is not None and np.isfinite(path.sigma_xyz_mm).any():
-        yield ("sigma", _SIGMA, lambda: figures.sigmas(path, names))
+        yield ("sigma", captions.SIGMA, lambda: figures.sigmas(path, names))
         where = figures.sigma_map(rig, path) if rig is not None else None
         if where is not None:
-            yield ("sigma", _SIGMA_MAP, _bound(figures.sigma_maps, where, path))
+            yield ("sigma", captions.SIGMA_MAP, _bound(figures.sigma_maps, where, path))
     if (
         view is not None
         and rig is not None
@@ -207,89 +232,10 @@ def _quality(content: ReportContent) -> Iterator[Job]:
         and len(view.residuals_right)
     ):
         sizes = {"left": rig.left.size_px, "right": rig.right.size_px}
-        yield ("calibration", _RESIDUALS, lambda: figures.residual_map(view, sizes))
+        yield ("calibration", captions.RESIDUALS, lambda: figures.residual_map(view, sizes))
     if view is not None and len(view.holdout_mm) > 1:
-        yield ("calibration", _HOLDOUT, lambda: figures.holdout(view))
+        yield ("calibration", captions.HOLDOUT, lambda: figures.holdout(view))
     for number_of, comparison in enumerate(content.comparisons):
         if np.isfinite(comparison.optical_mm).any():
-            caption = f"{clean(comparison.sensor, 60)}: {_SENSOR}"
+            caption = f"{clean(comparison.sensor, 60)}: {captions.SENSOR}"
             yield ("comparison", caption, _bound(figures.overlay, comparison, number_of))
-
-
-_SCENE = (
-    "Both cameras with what they see, and the path of each marker (numbers are marker ids)."
-    " Coordinates are those of the left camera: x to the right, y down, z away from it."
-)
-_MOTION = (
-    "Displacement of each marker from its mean position, while any marker was located. One scale a"
-    " row; a gap is a gap, with a"
-    " bar at the bottom where the marker was not located; circles are doubtful samples; grey:"
-    " start-up, shut-down and decay."
-)
-_FITTED = (
-    " Drawn only where the fitted motion holds: before and after it, frames of cameras out of step"
-    " would show false depth."
-)
-_CLOSE = (
-    "{length} s of the markers that move most: dots are {each}, the thin grey curve is the"
-    " fitted line where its frequency is known."
-)
-_ORBITS = (
-    "Path about the mean position in three projections, all on one scale of ± {reach} mm."
-    " Dots: single frames, evenly"
-    " chosen in long records. Thick: the ellipse of the dominant line."
-)
-_SPECTROGRAM = (
-    "Displacement of the markers that move most, the powers of their axes added: the darker, the"
-    " stronger (dB below the strongest). Dashed: the strongest frequency of each second. Dotted"
-    " uprights: limits of the phases. Frequencies are as sampled: above half the frame rate they"
-    " fold."
-)
-_RATIOS = (
-    "How much of the reference marker's motion arrives at each marker: ratio of the amplitudes of"
-    " the dominant line in the same phase. Diamond: all axes together with one standard deviation;"
-    " open symbols: single axes. Holds whatever the true frequency is."
-)
-_DECAY = (
-    "Free decay of the markers that begin largest, along their axis of largest motion. Dots: single"
-    " frames; full: the fit, its three axes with one pole; dashed: its envelope. Frequencies are as"
-    " sampled."
-)
-_SIGMA_MAP = (
-    "Where this pair measures well, seen from above at the markers' median height: lines of equal"
-    " standard deviation of one position, for the image noise of this trial. Dots: the markers;"
-    " grey: not seen by both cameras."
-)
-_DISTANCES = (
-    "Distances between markers. On one rigid body they should not change: what remains there is"
-    " the error of the whole chain. Left: standard deviation of every pair, larger squares vary"
-    " more. Right: the steadiest and the least steady pairs and some between."
-)
-_FREQUENCY = (
-    "Dominant line of each marker. Filled: known. Open: a candidate; the pictures alone cannot"
-    " tell it from the others (per cent: how likely, where that can be said). White ground: below"
-    " half the frame rate."
-)
-_AMPLITUDE = (
-    "Amplitude spectrum (peak) of the displacement. Dashed: the dominant line as this frame"
-    " rate shows it, the triangle its fitted amplitude. Dotted: noise floor."
-)
-_ACCELERATION = (
-    "Amplitude spectrum (peak) of the acceleration, the powers of the three axes added. Dashed: the"
-    " dominant line. Made as the spectrum above."
-)
-_PSD = (
-    "Power spectral density of the displacement, the powers of the three axes added. Dashed: the"
-    " dominant line; dotted: noise floor."
-)
-_SEEN = "State of every sample: full height means located; the thinner, the less is known."
-_SIGMA = (
-    "How well one position is known: median (symbol) and the middle 90 % of the frames (bar)."
-    " Depth (z) is weaker than x and y by about the distance over the baseline."
-)
-_RESIDUALS = "What the calibration leaves over at each board point, as needles."
-_HOLDOUT = "Known distances of the board, measured on frames that the calibration never saw."
-_SENSOR = (
-    "the displacement that the accelerometer predicts at the camera's own instants, and what the"
-    " camera saw. Left: the stretch that moves most; right: the difference over the whole record."
-)

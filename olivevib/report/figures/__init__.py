@@ -15,7 +15,12 @@ from olivevib.report.figures.scene import scene
 from olivevib.report.figures.sensor import overlay
 from olivevib.report.figures.sigma import sigmas
 from olivevib.report.figures.sigma_map import SigmaMap, sigma_map, sigma_maps
-from olivevib.report.figures.spectra import amplitude_spectra, power_spectra, total_spectra
+from olivevib.report.figures.spectra import (
+    Band,
+    amplitude_spectra,
+    power_spectra,
+    total_spectra,
+)
 from olivevib.report.figures.spectrogram import Spectrogram, spectrogram, spectrograms
 from olivevib.report.figures.together import (
     deflection,
@@ -29,6 +34,7 @@ from olivevib.report.figures.visibility import strips, visibility
 
 __all__ = [
     "MOST_ACROSS",
+    "Band",
     "Distance",
     "SigmaMap",
     "Spectrogram",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,11 +12,31 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 
 from olivevib.arrays import Floats
 from olivevib.report.figures import canvas
-from olivevib.report.lines import describe
+from olivevib.report.lines import describe, folded_hz
 from olivevib.report.words import unit_text
 from olivevib.vibration import Line, Spectrum
 
 MOST = 700  # points of one curve
+_BELOW = 0.1  # of the smallest sigma of a fitted line: where an axis of fitted motions ends
+
+
+@dataclass(frozen=True)
+class Band:
+    """What of a frequency axis is drawn: up to ``top_hz``; at ``half_hz`` lines fold.
+
+    fitted: the curves are those of a fitted motion. It holds sway, one line and its harmonics and
+    nothing else, so what stands between is the skirt of the window and no measured noise: no noise
+    floor is drawn, and the axis ends where the fit's own sigma does.
+    """
+
+    half_hz: float
+    top_hz: float
+    fitted: bool = False
+
+    @property
+    def axis(self) -> str:
+        """The words at the frequency axis."""
+        return "frequency, Hz" if self.fitted else "frequency as sampled, Hz"
 
 
 def noise_floor(f_hz: Floats, values: Floats, line_hz: float, resolution_hz: float) -> float:
@@ -26,22 +47,13 @@ def noise_floor(f_hz: Floats, values: Floats, line_hz: float, resolution_hz: flo
     return float(np.median(rest)) if rest.size else float("nan")
 
 
-def seen_at_hz(line: Line, nyquist_hz: float) -> float:
-    """Where a line of frequency f shows up below half the sampling rate, Hz."""
-    if not np.isfinite(line.f_hz):
-        return float("nan")
-    rate = 2 * nyquist_hz
-    folded = line.f_hz % rate
-    return float(min(folded, rate - folded))
-
-
 def amplitude_spectra(
-    spectrum: Spectrum, names: Mapping[int, str], ids: Sequence[int], nyquist_hz: float
+    spectrum: Spectrum, names: Mapping[int, str], ids: Sequence[int], band: Band
 ) -> str:
     """Peak amplitude over frequency, logarithmic: a row a marker, a column an axis.
 
     The dashed upright is the dominant line as the camera sees it, the triangle its fitted
-    amplitude, the dotted level the noise floor; the axis ends at half the sampling rate.
+    amplitude, the dotted level the noise floor of what was measured.
     """
     height = 0.66 + 0.98 * len(ids)
     lines = dict(zip(spectrum.ids.tolist(), spectrum.lines, strict=True))
@@ -50,16 +62,16 @@ def amplitude_spectra(
         grid = canvas.rows_and_columns(
             figure, len(ids), 3, margins_in=(0.6, 0.15, 0.4, 0.4), gaps_in=(0.2, 0.26), light=True
         )
-        limits = _limits(spectrum.amplitude[1:, np.isin(spectrum.ids, ids)])
+        limits = _limits(spectrum, spectrum.amplitude, ids, band, _least_known(spectrum, ids))
         for r, (row, marker_id) in enumerate(zip(grid, ids, strict=True)):
             m = int(np.flatnonzero(spectrum.ids == marker_id)[0])
             line = lines[marker_id]
             for k, ax in enumerate(row):
                 values = spectrum.amplitude[:, m, k]
-                where = _curve(ax, spectrum, values, (line, nyquist_hz), canvas.AXIS_COLOURS[k])
+                where = _curve(ax, spectrum, values, (line, band), canvas.AXIS_COLOURS[k])
                 if np.isfinite(where) and line.amplitude[k] > 0:
                     ax.plot(where, line.amplitude[k], "v", color=canvas.MARK, ms=4, mew=0)
-                _scales(ax, limits, left=k == 0, bottom=r == len(ids) - 1)
+                _scales(ax, limits, band, left=k == 0, bottom=r == len(ids) - 1)
         canvas.row_names(figure, grid, [f"{names[i]} — {describe(lines[i])}" for i in ids])
         unit = f"{unit_text(spectrum.unit)} peak"
         canvas.column_heads(figure, grid, [f"{axis}, {unit}" for axis in "xyz"])
@@ -70,32 +82,38 @@ def amplitude_spectra(
 
 
 def power_spectra(
-    spectrum: Spectrum, names: Mapping[int, str], ids: Sequence[int], nyquist_hz: float
+    spectrum: Spectrum, names: Mapping[int, str], ids: Sequence[int], band: Band
 ) -> str:
     """Power spectral density of the three axes together (powers add), a panel a marker."""
     about = (f"psd{ids[0]}", "Power spectral density", f"{unit_text(spectrum.unit)}²/Hz, x + y + z")
-    return _totals(spectrum, spectrum.psd.sum(axis=2), names, ids, nyquist_hz, about)
+    least = _least_known(spectrum, ids) ** 2 / 2 / (spectrum.resolution_hz * spectrum.enbw_bins)
+    shown = (spectrum.psd.sum(axis=2), least)
+    return _totals(spectrum, shown, names, ids, band, about)
 
 
 def total_spectra(
-    spectrum: Spectrum, names: Mapping[int, str], ids: Sequence[int], nyquist_hz: float
+    spectrum: Spectrum, names: Mapping[int, str], ids: Sequence[int], band: Band
 ) -> str:
     """Amplitude spectrum (peak) of the three axes together (powers add), a panel a marker."""
     total = np.sqrt(np.sum(spectrum.amplitude**2, axis=2))
     title = f"Amplitude spectrum of the {spectrum.quantity}"
     about = (f"{spectrum.quantity}{ids[0]}", title, f"{unit_text(spectrum.unit)} peak, all axes")
-    return _totals(spectrum, total, names, ids, nyquist_hz, about)
+    return _totals(spectrum, (total, _least_known(spectrum, ids)), names, ids, band, about)
 
 
 def _totals(
     spectrum: Spectrum,
-    total: Floats,
+    shown: tuple[Floats, float],
     names: Mapping[int, str],
     ids: Sequence[int],
-    nyquist_hz: float,
+    band: Band,
     about: tuple[str, str, str],
 ) -> str:
-    """One value (F, M) a frequency and marker, a panel a marker; about: name, title, unit."""
+    """One value (F, M) a frequency and marker, a panel a marker; about: name, title, unit.
+
+    shown: the values, and the least that a fit tells from nothing.
+    """
+    total, least = shown
     columns = 3
     rows = -(-len(ids) // columns)
     height = 0.66 + 1.1 * rows
@@ -110,13 +128,13 @@ def _totals(
             gaps_in=(0.2, 0.28),
             light=True,
         )
-        limits = _limits(total[1:, np.isin(spectrum.ids, ids)])
+        limits = _limits(spectrum, total, ids, band, least)
         panels = [ax for row in grid for ax in row]
         for place, (ax, marker_id) in enumerate(zip(panels, ids, strict=False)):
             m = int(np.flatnonzero(spectrum.ids == marker_id)[0])
-            _curve(ax, spectrum, total[:, m], (lines[marker_id], nyquist_hz), canvas.LEFT)
+            _curve(ax, spectrum, total[:, m], (lines[marker_id], band), canvas.LEFT)
             lowest = place + columns >= len(ids)
-            _scales(ax, limits, left=place % columns == 0, bottom=lowest)
+            _scales(ax, limits, band, left=place % columns == 0, bottom=lowest)
             ax.set_title(names[marker_id], loc="left", pad=3, fontsize=7.5, fontweight="bold")
         for ax in panels[len(ids) :]:
             ax.remove()
@@ -125,37 +143,55 @@ def _totals(
     return canvas.draw(about[0], f"{about[1]} of {len(ids)} markers", height, paint)
 
 
-def _limits(values: Floats) -> tuple[float, float]:
-    """Lowest and highest value worth drawing of spectra (F, …)."""
+def _least_known(spectrum: Spectrum, ids: Sequence[int]) -> float:
+    """The smallest sigma of a line's amplitude, in the spectrum's unit; 0 where none is known."""
+    lines = (line for i, line in zip(spectrum.ids, spectrum.lines, strict=True) if i in ids)
+    sigmas = np.concatenate([line.amplitude_sigma for line in lines])
+    sigmas = sigmas[np.isfinite(sigmas) & (sigmas > 0)]
+    return float(sigmas.min()) if sigmas.size else 0.0
+
+
+def _limits(
+    spectrum: Spectrum, values: Floats, ids: Sequence[int], band: Band, least: float
+) -> tuple[float, float]:
+    """Lowest and highest value worth drawing of spectra (F, M, …) of these markers."""
+    drawn = (spectrum.f_hz > 0) & (spectrum.f_hz <= band.top_hz)
+    values = values[np.ix_(drawn, np.isin(spectrum.ids, ids))]
     positive = values[np.isfinite(values) & (values > 0)]
     if not positive.size:
         return 1e-3, 1.0
     top = float(positive.max()) * 2
-    return max(float(np.percentile(positive, 2)) / 2, top * 1e-9), top
+    low = max(float(np.percentile(positive, 2)) / 2, top * 1e-9)
+    return (min(max(low, _BELOW * least), top / 100) if band.fitted else low), top
 
 
 def _curve(
-    ax: Axes, spectrum: Spectrum, values: Floats, at: tuple[Line, float], colour: str
+    ax: Axes, spectrum: Spectrum, values: Floats, at: tuple[Line, Band], colour: str
 ) -> float:
-    """One spectrum (F,) with its noise floor and the upright of its line; returns where that is."""
-    line, nyquist_hz = at
+    """One spectrum (F,) with the upright of its line; returns where that is.
+
+    What was measured also has its noise floor.
+    """
+    line, band = at
+    drawn = slice(1, int(np.searchsorted(spectrum.f_hz, band.top_hz)) + 1)
     shown = np.where(values > 0, values, np.nan)
-    ax.semilogy(*canvas.thin(spectrum.f_hz[1:], shown[1:], MOST), color=colour, lw=0.8)
-    where = seen_at_hz(line, nyquist_hz)
-    floor = noise_floor(spectrum.f_hz, values, where, spectrum.resolution_hz)
-    if floor > 0 and spectrum.quantity == "displacement":  # elsewhere noise is not level
+    ax.semilogy(*canvas.thin(spectrum.f_hz[drawn], shown[drawn], MOST), color=colour, lw=0.8)
+    where = folded_hz(line.f_hz, band.half_hz)
+    level = spectrum.quantity == "displacement" and not band.fitted  # elsewhere it is not level
+    floor = noise_floor(spectrum.f_hz, values, where, spectrum.resolution_hz) if level else 0.0
+    if floor > 0:
         ax.axhline(floor, color=canvas.QUIET, lw=0.7, ls=(0, (1, 2)))
     if np.isfinite(where):
         ax.axvline(where, color=canvas.MARK, lw=0.7, ls=(0, (4, 2)), zorder=1)
-    ax.axvline(nyquist_hz, color=canvas.QUIET, lw=0.8)
-    ax.set_xlim(0, nyquist_hz)
+    ax.axvline(band.top_hz, color=canvas.QUIET, lw=0.8)
+    ax.set_xlim(0, band.top_hz)
     return where
 
 
-def _scales(ax: Axes, limits: tuple[float, float], *, left: bool, bottom: bool) -> None:
+def _scales(ax: Axes, limits: tuple[float, float], band: Band, *, left: bool, bottom: bool) -> None:
     ax.set_ylim(limits)
     x = MaxNLocator(7, prune="upper").tick_values(*ax.get_xlim())
     y = LogLocator(numticks=4).tick_values(*limits)
     canvas.light_ticks(ax, x, y, left=left, bottom=bottom)
     if bottom:
-        ax.set_xlabel("frequency as sampled, Hz")
+        ax.set_xlabel(band.axis)

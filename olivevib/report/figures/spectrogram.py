@@ -29,7 +29,7 @@ class Spectrogram:
 
     power: mean square displacement of the axes together that a sine takes out, mm²; NaN: too few
     samples. Each window is fitted by least squares on its own times under a Hann weight, so gaps
-    and uneven times do no harm; frequencies fold at half the frame rate.
+    and uneven times do no harm. Of samples, frequencies fold at half the frame rate.
     """
 
     t_s: Floats
@@ -44,16 +44,22 @@ class Spectrogram:
         return np.where(np.isfinite(self.power).any(axis=0), best, np.nan)
 
 
-def spectrogram(trajectory: Trajectory, marker_id: int, half_rate_hz: float) -> Spectrogram | None:
-    """The spectrogram of one marker; None where the record is shorter than two windows."""
+def spectrogram(
+    trajectory: Trajectory, marker_id: int, top_hz: float, sway_hz: float = 0.0
+) -> Spectrogram | None:
+    """The spectrogram of one marker up to top_hz; None where the record is too short.
+
+    sway_hz: motion up to there is sway. It would outshine the line, so the picture begins one
+    width of a window's line (1 / its length) above it.
+    """
     samples = trajectory.samples(marker_id)
     window = whole(trajectory)
     length = min(WINDOW_S, (window.end_s - window.start_s) / 4)
-    if samples.t_s.size < 2 * FEWEST or length * half_rate_hz < 3:
+    if samples.t_s.size < 2 * FEWEST or length * top_hz < 3:
         return None
     count = min(MOST, int((window.end_s - window.start_s - length) / (length / 10)) + 1)
     middles = np.linspace(window.start_s + length / 2, window.end_s - length / 2, count)
-    f_hz = np.arange(1.0 / length, half_rate_hz, 1.0 / (BINS_A_WINDOW * length))
+    f_hz = np.arange(sway_hz + 1.0 / length, top_hz, 1.0 / (BINS_A_WINDOW * length))
     if count < 2 or f_hz.size < 2:
         return None
     columns = [_column(samples.t_s, samples.values, (at, length), f_hz) for at in middles]
@@ -75,19 +81,22 @@ def _column(t_s: Floats, values: Floats, window: tuple[float, float], f_hz: Floa
 
 
 def spectrograms(
-    found: Mapping[int, Spectrogram], names: Mapping[int, str], phases: Sequence[Phase]
+    found: Mapping[int, Spectrogram],
+    names: Mapping[int, str],
+    phases: Sequence[Phase],
+    across: str = "as sampled, Hz",
 ) -> str:
     """A panel a marker: time to the right, frequency upwards, darker = stronger; its ridge."""
-    height = 0.62 + 1.25 * len(found)
+    height = 0.66 + 1.33 * len(found)
 
     def paint(figure: Figure) -> None:
         grid = canvas.rows_and_columns(
-            figure, len(found), 1, margins_in=(0.6, 0.75, 0.3, 0.42), gaps_in=(0, 0.3)
+            figure, len(found), 1, margins_in=(0.6, 0.75, 0.3, 0.42), gaps_in=(0, 0.42)
         )
         for row, (marker_id, one) in zip(grid, found.items(), strict=True):
             _panel(row[0], one, phases)
             row[0].set_title(names[marker_id], loc="left", pad=3, fontweight="bold", fontsize=7.5)
-            row[0].set_ylabel("as sampled, Hz")
+            row[0].set_ylabel(across)
         grid[-1][0].set_xlabel("trial clock, s")
         _scale(figure)
 
