@@ -393,9 +393,9 @@ def test_facts_of_a_new_trial_are_not_known():
 def test_a_comparison_is_told_with_sigmas():
     told = comparison_text(scene.comparison(), PLAIN).plain
     assert "agrees: the gain is within" in told
-    assert "clock offset 1234.5 ± 0.02 ms" in told
-    assert "rotation 2.4 ± 0.2 °" in told
-    assert "12.000 Hz: camera 22.700 ± 0.200, sensor 22.600 ± 0.100 m/s²" in told
+    assert "clock offset 1234.500 ± 0.020 ms" in told
+    assert "rotation 2.40 ± 0.20 °" in told
+    assert "12.000 Hz: camera 22.70 ± 0.20, sensor 22.60 ± 0.10 m/s²" in told
 
 
 def test_outputs_say_what_where_and_what_is_missing_in_them():

@@ -24,8 +24,8 @@ from olivevib.tui.kept import Kept, place_of, read_kept, write_kept
 from olivevib.tui.loader import TrialRow
 from olivevib.tui.look import look_at
 from olivevib.tui.plan import form_fields, guesses, plan_of, trial_name
-from olivevib.tui.screens.error import error_text
 from olivevib.tui.themes import palette_of
+from olivevib.tui.views.faults import error_text
 from olivevib.tui.views.palette import Palette
 from olivevib.tui.views.progress import Progress
 from olivevib.tui.views.setting_rows import SettingRow, change_of, setting_rows, typed

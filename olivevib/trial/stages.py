@@ -147,10 +147,23 @@ def write_failure(folder: Path, stage: Stage, now: Fingerprint, error: OlivevibE
 
 def read_failure(folder: Path, stage: Stage, now: Fingerprint) -> StageState | None:
     """The failure of a stage on exactly these inputs and settings, if it failed on them."""
+    record = _failure_record(folder, stage)
+    if record.get("on") != now.canonical():
+        return None
+    return StageState(Condition.FAILED, str(record.get("what", "it failed")))
+
+
+def last_fault(folder: Path, stage: Stage) -> InputError | None:
+    """The whole error that a stage failed with last, what, why and remedy; None without one."""
+    record = _failure_record(folder, stage)
+    if not record:
+        return None
+    return InputError(*(str(record.get(part, "")) for part in ("what", "why", "remedy")))
+
+
+def _failure_record(folder: Path, stage: Stage) -> dict[str, Any]:
     try:
         record = json.loads(failure_file(folder, stage).read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        return None
-    if not isinstance(record, dict) or record.get("on") != now.canonical():
-        return None
-    return StageState(Condition.FAILED, str(record.get("what", "it failed")))
+        return {}
+    return record if isinstance(record, dict) else {}

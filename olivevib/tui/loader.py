@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from olivevib.reconstruction import Trajectory
     from olivevib.trial import Trial
     from olivevib.trial.quality import StageLine
+    from olivevib.tui.faults import Fault
     from olivevib.tui.views.coverage import Coverage
     from olivevib.tui.views.rig import RigScene
     from olivevib.tui.views.setting_rows import SettingRow
@@ -47,6 +48,7 @@ class TrialRow:
     simulated: bool = False
     archived: bool = False
     notes: str = ""
+    faults: tuple[Fault, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,7 @@ class TrialFacts:
     fault: OlivevibError | None = None
     resume: str = ""
     notes: str = ""
+    faults: tuple[Fault, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,7 @@ class Results:
     vibration: Vibration | None = None
     comparisons: tuple[Comparison, ...] = ()
     places: Mapping[int, str] = field(default_factory=dict)
+    faults: tuple[Fault, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -104,6 +108,7 @@ class CalibrationFacts:
     places: tuple[str, ...] = ()
     cautions: tuple[Mapping[str, str], ...] = ()
     scene: RigScene | None = None
+    faults: tuple[Fault, ...] = ()
 
 
 def guarded(read: Callable[[], Value]) -> Value | OlivevibError:
@@ -135,6 +140,7 @@ def trial_row(folder: Path) -> TrialRow:
 def _row(folder: Path) -> TrialRow:
     from olivevib.trial import Trial
     from olivevib.trial.quality import quality_of, stage_lines
+    from olivevib.tui.faults import faults_of
 
     trial = Trial.open(folder)
     session, tree = trial.settings.session, trial.settings.tree
@@ -151,6 +157,7 @@ def _row(folder: Path) -> TrialRow:
         session.simulated,
         session.archived,
         session.notes,
+        faults_of(trial, stages),
     )
 
 
@@ -159,6 +166,7 @@ def trial_facts(folder: Path) -> TrialFacts:
     from olivevib.trial import Trial
     from olivevib.trial.quality import stage_lines
     from olivevib.trial.summary import summary
+    from olivevib.tui.faults import faults_of
 
     trial = Trial.open(folder)
     journal = trial.private / "track.journal"
@@ -174,31 +182,35 @@ def trial_facts(folder: Path) -> TrialFacts:
         found if isinstance(found, OlivevibError) else None,
         resume,
         trial.settings.session.notes,
+        faults_of(trial, stages),
     )
 
 
 def results(folder: Path) -> Results:
     """What the result screens draw; raises InputError where the trial cannot be read."""
     from olivevib.trial import Trial
+    from olivevib.trial.quality import stage_lines
     from olivevib.trial.summary import summary
+    from olivevib.tui.faults import faults_of
 
     trial = Trial.open(folder)
     marked = {m.id: m.place or "" for m in trial.settings.markers.marker}
-    return Results(
-        folder, summary(trial), trial.trajectory, trial.vibration, trial.comparison, marked
-    )
+    found = (summary(trial), trial.trajectory, trial.vibration, trial.comparison)
+    return Results(folder, *found, marked, faults_of(trial, stage_lines(trial)))
 
 
 def calibration_facts(folder: Path) -> CalibrationFacts:
     """What the calibration page shows; raises InputError where a file cannot be read."""
     from olivevib.trial import Trial
+    from olivevib.trial.quality import stage_lines
     from olivevib.trial.summary import summary
+    from olivevib.tui.faults import faults_of
     from olivevib.tui.views.coverage import Coverage, camera_places
 
     trial = Trial.open(folder)
     record, rig, facts = trial.calibration, trial.rig, summary(trial)
     if record is None or rig is None:
-        return CalibrationFacts(facts)
+        return CalibrationFacts(facts, faults=faults_of(trial, stage_lines(trial)[:1]))
     points = (record.residuals_left, record.residuals_right)
     sizes = (rig.left.size_px, rig.right.size_px)
     return CalibrationFacts(

@@ -18,10 +18,13 @@ from olivevib.tui import jobs
 from olivevib.tui.loader import CalibrationFacts, calibration_facts
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.views.coverage import calibration_text, coverage_plot
+from olivevib.tui.views.faults import absent
 from olivevib.tui.views.live import coverage_text
+from olivevib.tui.views.old import old_words
 from olivevib.tui.views.palette import Palette
 from olivevib.tui.views.rig import rig_plot
 from olivevib.tui.views.sigma import sigma_text
+from olivevib.tui.widgets.old_note import OldNote
 from olivevib.tui.widgets.plot import Plot
 
 if TYPE_CHECKING:
@@ -81,12 +84,13 @@ class CalibrationPage(Page):
 
     def body(self) -> ComposeResult:
         """Two pictures above, words below."""
+        yield OldNote()
         with Horizontal(id="boards"):
             for side in SIDES:
                 yield Plot(id=f"{side}-board", title=f"{side} camera")
             yield Plot(id="in-space", title="in space")
         with VerticalScroll(id="verdict", classes="pane"):
-            yield Static("reading …", id="verdict-text", markup=False)
+            yield Static("reading …", id="verdict-text", classes="waits", markup=False)
 
     def on_mount(self) -> None:
         """Left camera first."""
@@ -108,6 +112,11 @@ class CalibrationPage(Page):
             plot.show(partial(coverage_plot, coverage))
         if value.scene is not None:
             self.query_one("#in-space", Plot).show(partial(rig_plot, value.scene))
+        if not value.coverage:
+            for pane in PANES:
+                lacking = absent(value.summary, value.faults, "No calibration", "calibrate")
+                self.query_one(f"#{pane}", Plot).show(lacking)
+        self.query_one(OldNote).say(old_words(value.summary, "calibrate") if value.coverage else "")
         self._tell()
 
     def _tell(self) -> None:

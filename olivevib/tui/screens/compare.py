@@ -11,9 +11,13 @@ from olivevib.comparison import Comparison
 from olivevib.tui.loader import Results, results
 from olivevib.tui.screens.page import Help
 from olivevib.tui.screens.time_page import TimePage
+from olivevib.tui.views.faults import absent
 from olivevib.tui.views.motion import MotionPlot
 from olivevib.tui.views.of_results import comparison_of
+from olivevib.tui.views.old import old_words
 from olivevib.tui.views.tables import comparison_text, not_compared_text
+from olivevib.tui.widgets.old_note import OldNote
+from olivevib.tui.widgets.plot import Draw, nothing
 
 
 class ComparePage(TimePage):
@@ -44,7 +48,16 @@ class ComparePage(TimePage):
         """Draw the first sensor, or say why there is none."""
         if isinstance(value, Results):
             self._results = value
+            old = old_words(value.summary, "compare") if value.comparisons else ""
+            self.query_one(OldNote).say(old)
             self.draw()
+
+    def lacking(self) -> Draw:
+        """Why there is no comparison."""
+        found = self._results
+        if found is None:
+            return nothing
+        return absent(found.summary, found.faults, "No comparison", "compare")
 
     @property
     def _one(self) -> Comparison | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
@@ -12,7 +11,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Static
 
 from olivevib.errors import OlivevibError
-from olivevib.tui.harmless import harmless
+from olivevib.tui.views.faults import error_text
 
 
 class ErrorScreen(ModalScreen[None]):
@@ -34,16 +33,3 @@ class ErrorScreen(ModalScreen[None]):
     def on_click(self) -> None:
         """A click anywhere closes."""
         self.dismiss()
-
-
-def error_text(error: OlivevibError | None) -> Text:
-    """The three parts of an error as text; lines of a list of faults stay lines."""
-    out = Text()
-    if error is None:
-        return out
-    for title, part in (("", error.what), ("", error.why), ("Next: ", error.remedy)):
-        if part:
-            lines = "\n".join(harmless(line, 400) for line in part.splitlines()[:40])
-            out.append(f"{title}{lines}\n\n", "bold" if part is error.what else "")
-    out.rstrip()
-    return out

@@ -14,9 +14,13 @@ from olivevib.tui.loader import Results, guarded, results
 from olivevib.tui.screens.edit import EditScreen
 from olivevib.tui.screens.page import Command, Help
 from olivevib.tui.screens.time_page import TimePage
+from olivevib.tui.views.faults import absent
 from olivevib.tui.views.motion import MotionPlot
 from olivevib.tui.views.of_results import marker_name, motion_of, phases_text
+from olivevib.tui.views.old import old_words
 from olivevib.tui.views.phases import HINT, Row, phases_of, typed_phases, with_steady
+from olivevib.tui.widgets.old_note import OldNote
+from olivevib.tui.widgets.plot import Draw, nothing
 
 
 class MotionPage(TimePage):
@@ -48,9 +52,19 @@ class MotionPage(TimePage):
         """Draw the marker that was looked at last."""
         if isinstance(value, Results):
             self._results = value
+            there = value.trajectory is not None
+            old = old_words(value.summary, "reconstruct", "analyse") if there else ""
+            self.query_one(OldNote).say(old)
             self.draw()
             text = phases_text(value.vibration, self.olive.palette)
             self.query_one("#numbers", Static).update(text)
+
+    def lacking(self) -> Draw:
+        """Why there is no path yet."""
+        found = self._results
+        if found is None:
+            return nothing
+        return absent(found.summary, found.faults, "No path of any marker", "reconstruct")
 
     @property
     def _ids(self) -> list[int]:

@@ -13,12 +13,13 @@ from textual.binding import Binding, BindingType
 from textual.message import Message
 from textual.screen import Screen
 from textual.widget import Widget
-from textual.widgets import Footer
+from textual.widgets import Footer, Static
 from textual.worker import get_current_worker
 
 from olivevib.errors import OlivevibError
 from olivevib.tui.loader import change_trial, guarded
 from olivevib.tui.screens.early import EarlyKeys
+from olivevib.tui.views.faults import error_text
 from olivevib.tui.widgets.title import Title
 from olivevib.tui.widgets.work_line import WorkLine
 
@@ -58,6 +59,7 @@ class Page(EarlyKeys, Screen[None]):
     HELP_TEXT: ClassVar[Help] = Help("", "")
     JUMPS: ClassVar[tuple[Jump, ...]] = ()
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "back", "Back", show=False)]
+    _shown_once = False
 
     class Read(Message):
         """What was read in the thread, or the error that says why not."""
@@ -111,9 +113,26 @@ class Page(EarlyKeys, Screen[None]):
     def on_page_read(self, message: Read) -> None:
         """Show what was read; an error is shown until it is read by a person."""
         if isinstance(message.value, OlivevibError):
+            self._unread(message.value)
             self.olive.show_error(message.value)
         else:
+            self._shown_once = True
             self.show(message.value)
+
+    def _unread(self, error: OlivevibError) -> None:
+        """Say in every pane that still waits why nothing will come."""
+        from olivevib.tui.widgets.picture import Picture
+        from olivevib.tui.widgets.plot import Plot
+
+        if self._shown_once:
+            return
+        words = error_text(error)
+        for plot in self.query(Plot):
+            plot.show(lambda size, palette: words)
+        for picture in self.query(Picture):
+            picture.say(str(error))
+        for text in self.query(".waits").results(Static):
+            text.update(words)
 
     def read(self) -> object:
         """Frozen values for ``show``; runs in a thread and may raise OlivevibError."""

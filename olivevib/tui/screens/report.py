@@ -76,7 +76,7 @@ class ReportPage(Page):
         """The outputs and a preview of the marked one."""
         yield DataTable(id="outputs", classes="pane", cursor_type="row")
         with VerticalScroll(id="contents", classes="pane"):
-            yield Static("reading …", id="preview", markup=False)
+            yield Static("reading …", id="preview", classes="waits", markup=False)
 
     def on_mount(self) -> None:
         """Start in the table."""

@@ -14,11 +14,14 @@ from textual.widgets import DataTable
 from olivevib.tui.harmless import harmless
 from olivevib.tui.loader import Results, results
 from olivevib.tui.screens.page import Command, Help, Jump, Page
+from olivevib.tui.views.faults import absent
 from olivevib.tui.views.of_results import AXES, QUANTITIES, marker_name, orbits_of, spectrum_of
+from olivevib.tui.views.old import OLD, old_words
 from olivevib.tui.views.orbits import PLANES, Orbit, Plane, orbit_at, orbits_plot, page_of
 from olivevib.tui.views.spectrum import SpectrumPlot, frame_of, next_peak, spectrum_plot
 from olivevib.tui.views.tables import MARKER_COLUMNS, marker_row
-from olivevib.tui.widgets.plot import Plot, nothing
+from olivevib.tui.widgets.old_note import OldNote
+from olivevib.tui.widgets.plot import Plot
 
 PANES = ("orbits", "spectrum", "markers")
 
@@ -58,11 +61,13 @@ class ResultsPage(Page):
     _results: Results | None = None
     _orbits: tuple[Orbit, ...] = ()
     _chosen = 0
+    _old = ""  # since when the numbers are out of date
     _quantity = "displacement"
     _cursor_hz: float | None = None
 
     def body(self) -> ComposeResult:
-        """The three panes."""
+        """The three panes; above them since when they are old."""
+        yield OldNote()
         with Container(id="results"):
             yield Plot(id="orbits", title="1 Orbits")
             yield Plot(id="spectrum", title="2 Spectrum")
@@ -85,6 +90,8 @@ class ResultsPage(Page):
             return
         self._results = value
         path = value.trajectory
+        self._old = old_words(value.summary, "reconstruct", "analyse") if path else ""
+        self.query_one(OldNote).say(self._old)
         self._orbits = orbits_of(path, value.vibration, value.summary) if path else ()
         ids = [o.id for o in self._orbits]
         kept = self.olive.kept.marker
@@ -97,7 +104,7 @@ class ResultsPage(Page):
         table.clear()
         rows = self._results.summary["markers"] if self._results else []
         for marker in rows:
-            table.add_row(*marker_row(marker, self.olive.palette))
+            table.add_row(*marker_row(marker, self.olive.palette, bool(self._old)))
         if rows:
             table.move_cursor(row=self._chosen)
 
@@ -107,13 +114,17 @@ class ResultsPage(Page):
         self._draw()
 
     def _draw(self) -> None:
+        found, plot = self._results, self._spectrum()
+        if found is None:
+            return
+        lacking = partial(absent, found.summary, found.faults)
+        orbits, spectrum = self.query_one("#orbits", Plot), self.query_one("#spectrum", Plot)
         drawn = partial(orbits_plot, self._orbits, self._plane, self._chosen)
-        self.query_one("#orbits", Plot).show(drawn)
-        plot = self._spectrum()
-        draw = partial(spectrum_plot, plot, self._cursor_hz) if plot else nothing
-        pane = self.query_one("#spectrum", Plot)
-        pane.show(draw)
-        pane.border_subtitle = "" if plot else "not analysed yet: Esc, then r runs the stages"
+        orbits.show(drawn if self._orbits else lacking("No path of any marker", "reconstruct"))
+        line = partial(spectrum_plot, plot, self._cursor_hz) if plot else None
+        spectrum.show(line or lacking("No spectrum", "analyse"))
+        for pane in (orbits, spectrum, self.query_one("#markers")):
+            pane.border_subtitle = f"{OLD} {self._old}" if self._old else ""
 
     @property
     def _plane(self) -> Plane:

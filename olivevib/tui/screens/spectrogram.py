@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
+from rich.text import Text
 from textual import work
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -16,9 +17,14 @@ from textual.worker import get_current_worker
 from olivevib.tui.harmless import harmless
 from olivevib.tui.loader import Results, guarded, results, shades
 from olivevib.tui.screens.page import Command, Help, Jump, Page
+from olivevib.tui.views.faults import absent
 from olivevib.tui.views.of_results import marker_name, phases_text
+from olivevib.tui.views.old import old_words
 from olivevib.tui.views.spectrogram import ShadePlot, shade_plot
-from olivevib.tui.widgets.plot import Plot, nothing
+from olivevib.tui.widgets.old_note import OldNote
+from olivevib.tui.widgets.plot import Draw, Plot
+
+TOO_SHORT = "No spectrogram: this marker has no path of two seconds."
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,7 @@ class SpectrogramPage(Page):
 
     def body(self) -> ComposeResult:
         """The plot and the phases below it."""
+        yield OldNote()
         yield Plot(id="shades", title="spectrogram")
         yield Static(id="numbers", markup=False)
 
@@ -75,12 +82,18 @@ class SpectrogramPage(Page):
         if isinstance(value, Shown):
             self._shown = value
             pane = self.query_one("#shades", Plot)
-            pane.show(partial(shade_plot, value.plot) if value.plot else nothing)
-            pane.border_subtitle = (
-                "" if value.plot else "no path of two seconds yet: Esc, then r runs the stages"
-            )
+            found = value.results
+            pane.show(partial(shade_plot, value.plot) if value.plot else self._lacking(found))
+            there = found.trajectory is not None
+            old = old_words(found.summary, "reconstruct", "analyse") if there else ""
+            self.query_one(OldNote).say(old)
             text = phases_text(value.results.vibration, self.olive.palette)
             self.query_one("#numbers", Static).update(text)
+
+    def _lacking(self, found: Results) -> Draw:
+        if found.trajectory is None:
+            return absent(found.summary, found.faults, "No path of any marker", "reconstruct")
+        return lambda size, palette: Text(TOO_SHORT, palette.muted)
 
     def recolour(self) -> None:
         """Draw again in the new theme."""

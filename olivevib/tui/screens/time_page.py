@@ -13,7 +13,8 @@ from textual.widgets import Static
 from olivevib.tui.screens.page import Jump, Page
 from olivevib.tui.views.axes import LEFT
 from olivevib.tui.views.motion import MotionPlot, motion_plot, window
-from olivevib.tui.widgets.plot import Plot, nothing
+from olivevib.tui.widgets.old_note import OldNote
+from olivevib.tui.widgets.plot import Draw, Plot, nothing
 
 MOST_ZOOM = 10
 STEP = 0.25  # of the stretch on screen
@@ -35,6 +36,7 @@ class TimePage(Page):
 
     def body(self) -> ComposeResult:
         """The curves and the numbers below them."""
+        yield OldNote()
         yield Plot(id="curves", title=self.NAME)
         yield Static(id="numbers", markup=False)
 
@@ -46,11 +48,15 @@ class TimePage(Page):
         """What to draw now; None while nothing is known."""
         return None
 
+    def lacking(self) -> Draw:
+        """What stands where the curves would be, as long as there are none."""
+        return nothing
+
     def draw(self) -> None:
         """Draw the present stretch."""
         plot = self.plot()
         pane = self.query_one("#curves", Plot)
-        pane.show(partial(motion_plot, plot, self._window(plot)) if plot else nothing)
+        pane.show(partial(motion_plot, plot, self._window(plot)) if plot else self.lacking())
 
     def _window(self, plot: MotionPlot) -> tuple[float, float]:
         return window(plot, self._zoom, self._centre_s)

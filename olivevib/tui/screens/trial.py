@@ -14,13 +14,14 @@ from textual.coordinate import Coordinate
 from textual.widgets import DataTable, Static
 
 from olivevib.tui import jobs, tool_jobs
-from olivevib.tui.harmless import harmless, plain
+from olivevib.tui.harmless import cut, harmless, plain
 from olivevib.tui.loader import STAGE_NAMES, TrialFacts, result_stamps, trial_facts
 from olivevib.tui.screens.edit import EditScreen
-from olivevib.tui.screens.error import error_text
 from olivevib.tui.screens.page import Command, Help, Jump, Page
+from olivevib.tui.views.faults import error_text
 from olivevib.tui.widgets.title import Title
 
+BESIDE = 32  # columns of the table of stages beside the reason
 LOOK_S = 0.5  # how often the results are looked at while work runs
 FOUND_ON = {
     "calibrate": "calibration",
@@ -54,7 +55,7 @@ class TrialPage(Page):
     )
     JUMPS = (Jump("s", "#stages"), Jump("w", "#warnings"), Jump("f", "#facts"))
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("enter", "open", "Show what the stage found", show=False),
+        Binding("enter", "open", "Show what the stage found, or why it failed", show=False),
         Binding("r", "run", "Run all"),
         Binding("t", "run_one", "Run one"),
         Binding("v", "page('results')", "Results"),
@@ -79,7 +80,7 @@ class TrialPage(Page):
         yield DataTable(id="stages", classes="pane", cursor_type="row")
         with Horizontal(id="below"):
             with VerticalScroll(id="warnings", classes="pane"):
-                yield Static("reading …", id="warning-text", markup=False)
+                yield Static("reading …", id="warning-text", classes="waits", markup=False)
             with VerticalScroll(id="facts", classes="pane"):
                 yield Static("", id="fact-text", markup=False)
 
@@ -138,15 +139,15 @@ class TrialPage(Page):
         if summary is None:
             warnings, known, count = error_text(facts.fault), Text(""), 1
         else:
-            run = any(stage.state in ("done", "stale") for stage in facts.stages)
-            warnings, count = (
-                warnings_text(summary["warnings"], run, palette),
-                len(summary["warnings"]),
-            )
+            run = any(stage.state not in ("missing", "skipped") for stage in facts.stages)
+            warnings = warnings_text(summary["warnings"], run, palette, facts.faults)
+            count = len(summary["warnings"])
             known = facts_text(summary, palette)
         self.query_one("#warning-text", Static).update(warnings)
         self.query_one("#fact-text", Static).update(known)
-        self.query_one("#warnings").border_title = f"Warnings ({count})" if count else "Warnings"
+        title = f"Warnings ({count})" if count else "Warnings"
+        wrong = any(fault.state == "failed" for fault in facts.faults)
+        self.query_one("#warnings").border_title = f"What failed · {title}" if wrong else title
 
     def _show_stages(self, facts: TrialFacts) -> None:
         from olivevib.tui.views.tables import state_cell
@@ -160,7 +161,17 @@ class TrialPage(Page):
                 reason = f"{reason}; {facts.resume}"
             state = state_cell("running" if running else stage.state, self.olive.palette)
             table.update_cell_at(Coordinate(at, 1), state, update_width=True)
-            table.update_cell_at(Coordinate(at, 2), plain(reason, 160), update_width=True)
+            table.update_cell_at(Coordinate(at, 2), self._reason_cell(reason), update_width=True)
+
+    def _reason_cell(self, reason: str) -> Text:
+        """The reason as far as the table is wide; whole it stands below, and behind Enter."""
+        return plain(cut(harmless(reason, 160), max(20, self.size.width - BESIDE)))
+
+    def on_resize(self) -> None:
+        """The reasons depend on the width."""
+        facts = getattr(self, "_facts", None)
+        if facts is not None:
+            self._show_stages(facts)
 
     def recolour(self) -> None:
         """Draw again in the new theme."""
@@ -174,9 +185,14 @@ class TrialPage(Page):
 
     @on(DataTable.RowSelected, "#stages")
     def action_open(self) -> None:
-        """Show what the marked stage found."""
+        """Show what the marked stage found, or the whole error that it failed with."""
         stage = STAGE_NAMES[self.query_one("#stages", DataTable).cursor_row]
-        self.action_page(FOUND_ON[stage])
+        facts = getattr(self, "_facts", None)
+        fault = next((f for f in facts.faults if f.stage == stage), None) if facts else None
+        if fault is not None:
+            self.olive.show_error(fault.error)
+        else:
+            self.action_page(FOUND_ON[stage])
 
     def action_run_one(self) -> None:
         """Run the marked stage, whatever its state."""

@@ -16,7 +16,7 @@ from olivevib.tui.views.motion import Band, MotionPlot
 from olivevib.tui.views.orbits import Orbit
 from olivevib.tui.views.palette import Palette
 from olivevib.tui.views.spectrum import Mark, SpectrumPlot, folded
-from olivevib.tui.views.words import DECIDED, frequency, short
+from olivevib.tui.views.words import DECIDED, alone, frequency
 from olivevib.vibration import Line, LineStatus, Phase, Spectrum, Vibration
 
 AXES = ("all", "x", "y", "z")
@@ -56,7 +56,8 @@ def orbits_of(
 
 def _caption(marker: Mapping[str, Any]) -> str:
     place, size = harmless(marker.get("place") or "", 12), marker.get("displacement_pp_mm")
-    return " · ".join(part for part in (place, f"{short(size, 2)} mm" if size else "") if part)
+    told = f"{alone(size, marker['displacement_pp_sigma_mm'], 2)} mm" if size else ""
+    return " · ".join(part for part in (place, told) if part)
 
 
 def path_mm(trajectory: Trajectory, column: int, phase: Phase | None) -> Floats:

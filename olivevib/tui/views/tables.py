@@ -10,11 +10,15 @@ from rich.style import Style
 from rich.text import Text
 
 from olivevib.tui.harmless import harmless, plain
+from olivevib.tui.views.faults import fault_text
+from olivevib.tui.views.old import OLD, old_words
 from olivevib.tui.views.palette import Palette
-from olivevib.tui.views.words import GLYPHS, marker_frequency, number, short
+from olivevib.tui.views.words import GLYPHS, marker_frequency, number, with_spread
+from olivevib.values import with_sigma
 
 if TYPE_CHECKING:
     from olivevib.comparison import Comparison
+    from olivevib.tui.faults import Fault
 
 STATE_MEANINGS = {"done": "good", "stale": "warn", "failed": "bad", "blocked": "warn"}
 QUALITY_MEANINGS = {
@@ -46,28 +50,64 @@ def quality_cell(word: str, palette: Palette) -> Text:
     return Text(word, meaning(palette, QUALITY_MEANINGS.get(word)))
 
 
-def marker_row(marker: Mapping[str, Any], palette: Palette) -> tuple[Text, ...]:
-    """One marker of the summary as table cells; – is not known."""
-    peaks = [short(marker["amplitude_mm"][axis], 3) for axis in "xyz"]
+def marker_row(marker: Mapping[str, Any], palette: Palette, old: bool = False) -> tuple[Text, ...]:
+    """One marker of the summary as table cells, each value ± its sigma; – is not known.
+
+    old: the numbers are overtaken; each of them says so by a mark and its style.
+    """
+    amplitude, sigma = marker["amplitude_mm"], marker["amplitude_sigma_mm"]
+    peaks = [with_spread(amplitude[axis], sigma[axis], 3) for axis in "xyz"]
+    across = with_spread(marker["displacement_pp_mm"], marker["displacement_pp_sigma_mm"], 3)
+    rms = with_spread(marker["acceleration_rms_m_s2"], _rms_sigma(marker), 2)
     known = marker["frequency_hz"] is not None
-    return (
-        Text(str(marker["id"]), justify="right"),
+    style = palette.warn if old else palette.text
+
+    def value(text: str) -> Text:
+        return Text(f"{OLD} {text}" if old and text != "–" else text, style, justify="right")
+
+    row = (
+        Text(str(marker["id"]), style, justify="right"),
         plain(marker["place"] or "–", 12),
-        Text(marker_frequency(marker), meaning(palette, "good" if known else "warn")),
-        Text(short(marker["displacement_pp_mm"], 3), justify="right"),
-        Text(f"{marker['seen_fraction']:.0%}", justify="right"),
-        *(Text(peak, justify="right") for peak in peaks),
-        Text(short(marker["acceleration_rms_m_s2"], 2), justify="right"),
+        Text(marker_frequency(marker), meaning(palette, "good" if known and not old else "warn")),
+        value(across),
+        Text(f"{marker['seen_fraction']:.0%}", style, justify="right"),
+        *map(value, peaks),
+        value(rms),
     )
+    if old:
+        row[2].plain = f"{OLD} {row[2].plain}"
+    return row
 
 
-def warnings_text(warnings: Sequence[Mapping[str, str]], run: bool, palette: Palette) -> Text:
-    """Every warning with its remedy; what to do first where nothing has ``run`` yet."""
+def _rms_sigma(marker: Mapping[str, Any]) -> float | None:
+    """Sigma of the rms acceleration from that of the line's amplitude; None where unknown."""
+    rms = marker["acceleration_rms_m_s2"]
+    size, spread = (
+        [v for v in marker[name].values() if v is not None and math.isfinite(v)]
+        for name in ("amplitude_mm", "amplitude_sigma_mm")
+    )
+    if rms is None or len(size) != 3 or len(spread) != 3 or not any(size):
+        return None
+    # of the root of the squares: each axis by its share
+    variance = sum((a * s) ** 2 for a, s in zip(size, spread, strict=True))
+    return float(rms * math.sqrt(variance) / sum(a * a for a in size))
+
+
+def warnings_text(
+    warnings: Sequence[Mapping[str, str]],
+    run: bool,
+    palette: Palette,
+    faults: Sequence[Fault] = (),
+) -> Text:
+    """What failed, whole; every warning with its remedy; what to do where nothing has ``run``."""
     if not run:
         return Text("Nothing has run yet.\nr runs every stage; s describes the trial first.")
-    if not warnings:
-        return Text("No warnings.", palette.muted)
     out = Text()
+    for fault in faults:
+        out.append_text(fault_text(fault, palette))
+        out.append("\n\n")
+    if not warnings and not faults:
+        out.append("No warnings.", palette.muted)
     for warning in warnings:
         out.append("⚠ ", palette.warn)
         out.append(f"{harmless(warning['text'], 400)}\n")
@@ -80,14 +120,16 @@ def warnings_text(warnings: Sequence[Mapping[str, str]], run: bool, palette: Pal
 def facts_text(summary: Mapping[str, Any], palette: Palette) -> Text:
     """Calibration, timing and comparison of a trial in a few lines each."""
     blocks = (
-        ("Calibration", _calibration(summary["calibration"])),
-        ("Timing", _timing(summary["timing"])),
-        ("Markers", _markers(summary["markers"])),
-        ("Accelerometer", _comparison(summary["comparison"])),
+        ("Calibration", ("calibrate",), _calibration(summary["calibration"])),
+        ("Timing", ("track", "reconstruct"), _timing(summary["timing"])),
+        ("Markers", ("reconstruct", "analyse"), _markers(summary["markers"])),
+        ("Accelerometer", ("compare",), _comparison(summary["comparison"])),
     )
     out = Text()
-    for title, lines in blocks:
-        out.append(f"{title}\n", palette.accent)
+    for title, stages, lines in blocks:
+        out.append(title, palette.accent)
+        old = old_words(summary, *stages) if lines else ""
+        out.append(f"  {OLD} {old}\n" if old else "\n", palette.warn)
         out.append("".join(f"  {line}\n" for line in lines) or "  not known yet\n")
     out.rstrip()
     return out
@@ -111,14 +153,16 @@ def _timing(t: Mapping[str, Any]) -> list[str]:
     for side in ("left", "right"):
         s = t[side]
         if s["frame_rate_hz"] is not None:
-            row = "unknown" if s["row_time_s"] is None else f"{s['row_time_s'] * 1e6:.2f} µs"
+            known = s["row_time_s"] is not None
+            row = with_spread(s["row_time_s"], s["row_time_sigma_s"], 2, 1e6, "µs")
             lines.append(
                 f"{side} {s['frame_rate_hz']:.3f} frames/s, {s['frames']} frames, "
-                f"{s['dropped']} dropped, row time {row}"
+                f"{s['dropped']} dropped, row time {row if known else 'unknown'}"
             )
     if t["right_offset_source"]:
-        offset = t["right_offset_s"]
-        told = "not known, taken as zero" if offset is None else f"{offset * 1e3:+.2f} ms"
+        told = "not known, taken as zero"
+        if t["right_offset_s"] is not None:
+            told = with_spread(t["right_offset_s"], t["right_offset_sigma_s"], 2, 1e3, "ms")
         lines.append(f"right camera's offset {told} ({t['right_offset_source']})")
     return lines
 
@@ -144,10 +188,10 @@ def _comparison(c: Mapping[str, Any]) -> list[str]:
 def comparison_text(c: Comparison, palette: Palette) -> Text:
     """The numbers of a comparison, each with its sigma, below its verdict."""
     rows = (
-        ("clock offset", _with_sigma(c.clock_offset_s * 1e3, c.clock_offset_sigma_s * 1e3, "ms")),
-        ("clock drift", _with_sigma(c.clock_drift_ppm, c.clock_drift_sigma_ppm, "ppm")),
-        ("gain", _with_sigma(c.gain, c.gain_sigma, "")),
-        ("rotation", _with_sigma(c.rotation_deg, c.rotation_sigma_deg, "°")),
+        ("clock offset", with_spread(c.clock_offset_s, c.clock_offset_sigma_s, 2, 1e3, "ms")),
+        ("clock drift", with_spread(c.clock_drift_ppm, c.clock_drift_sigma_ppm, 1, 1, "ppm")),
+        ("gain", with_spread(c.gain, c.gain_sigma, 3)),
+        ("rotation", with_spread(c.rotation_deg, c.rotation_sigma_deg, 1, 1, "°")),
         ("coherence", number(c.coherence, 3)),
     )
     out = Text()
@@ -157,8 +201,8 @@ def comparison_text(c: Comparison, palette: Palette) -> Text:
     for line in c.lines:
         out.append(
             f"\n{line.f_hz:.3f} Hz: "
-            f"camera {line.optical_m_s2:.3f} ± {line.optical_sigma_m_s2:.3f}, "
-            f"sensor {line.sensor_m_s2:.3f} ± {line.sensor_sigma_m_s2:.3f} m/s², "
+            f"camera {with_sigma(line.optical_m_s2, line.optical_sigma_m_s2, 3)}, "
+            f"sensor {with_sigma(line.sensor_m_s2, line.sensor_sigma_m_s2, 3)} m/s², "
             f"phase {round(line.phase_deg, 1) + 0.0:+.1f} ± {line.phase_sigma_deg:.1f}°"
         )
     return out
@@ -171,10 +215,3 @@ def not_compared_text(summary: Mapping[str, Any], palette: Palette) -> Text:
     out.append(f"{harmless(stage.get('reason', 'reading …'), 300)}\n")
     out.append("s binds an accelerometer file to a marker, r runs the stage.", palette.muted)
     return out
-
-
-def _with_sigma(value: float, sigma: float, unit: str) -> str:
-    if not math.isfinite(value):
-        return "not known"
-    spread = f" ± {sigma:.2g}" if math.isfinite(sigma) else ""
-    return f"{value:.5g}{spread}{f' {unit}' if unit else ''}"

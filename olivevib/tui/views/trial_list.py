@@ -60,7 +60,12 @@ def why_text(row: TrialRow, palette: Palette) -> Text:
     out.append(f": {harmless(row.why, 300)}")
     if row.notes:
         out.append(f"\n{harmless(row.notes, 160)}", palette.muted)
+    for fault in row.faults[:1]:
+        for title, part in (("", fault.error.why), ("Next: ", fault.error.remedy)):
+            out.append(f"\n{title}{harmless(part, 400)}" if part else "")
     open_ = [s for s in row.stages if s.state not in ("done", "missing")]
+    if row.faults:  # the others wait for this one, and it stands above
+        open_ = []
     for stage in open_[:3]:
         out.append(f"\n{stage.name} {stage.state}: {harmless(stage.reason, 160)}", palette.muted)
     return out

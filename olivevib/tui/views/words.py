@@ -28,9 +28,22 @@ def number(value: float | None, digits: int, unit: str = "") -> str:
     return f"{value:.{digits}f}{' ' * bool(unit)}{unit}"
 
 
-def short(value: float | None, digits: int) -> str:
-    """The number for a table, – where it is not known."""
-    return "–" if value is None or not math.isfinite(value) else f"{value:.{digits}f}"
+def with_spread(
+    value: float | None, sigma: float | None, digits: int, scale: float = 1.0, unit: str = ""
+) -> str:
+    """The value ± sigma, no more digits than that allows; ``digits`` decimals without a sigma.
+
+    Both are multiplied by ``scale`` first, into ``unit``; – for a value that is not known.
+    """
+    if value is None or not math.isfinite(value):
+        return "–"
+    spread = None if sigma is None else scale * sigma
+    return f"{with_sigma(scale * value, spread, digits)}{' ' * bool(unit)}{unit}"
+
+
+def alone(value: float, sigma: float | None, digits: int) -> str:
+    """The value with no more digits than its sigma allows, where there is no room for ±."""
+    return with_sigma(value, sigma, digits).split(" ± ")[0]
 
 
 def frequency(
