@@ -268,6 +268,7 @@ def _result_verbs(verbs: Any) -> None:
     report.add_argument("--pdf", action="store_true", help="also as PDF (needs olivevib[pdf])")
     report.add_argument("--figures", action="store_true", help="also each figure as an SVG file")
     report.add_argument("--season", action="store_true", help="only the page over all trials")
+    report.add_argument("--archived", action="store_true", help="archived trials in it too")
     report.add_argument("--parquet", action="store_true", help="the season's table also as Parquet")
     export = _add(verbs, "export", "results:export", "the 3-D paths for other programs")
     export.add_argument("trial", metavar="TRIAL")

@@ -66,8 +66,13 @@ def report(arguments: argparse.Namespace, console: Console) -> int:
     also = Also(pdf=arguments.pdf, figures=arguments.figures, parquet=arguments.parquet)
     trials = [Trial.open(folder) for folder in find_trials(arguments.trials, Path())]
     pages = not arguments.season
-    for path in pipeline.report(trials, arguments.output, console.tick, also, pages):
+    archived = arguments.archived
+    for path in pipeline.report(trials, arguments.output, console.tick, also, pages, archived):
         _out(str(path))
+    hidden = [t.name for t in trials if t.settings.session.archived and not archived]
+    if hidden and (len(trials) > 1 or not pages):
+        told = f"archived, not in the season: {', '.join(hidden)}"
+        console.say(f"{told}  (--archived takes them in)")
     return 0
 
 

@@ -83,12 +83,14 @@ def report(
     tick: Tick = silent,
     also: Also | None = None,
     pages: bool = True,
+    archived: bool = False,
 ) -> Iterator[Path]:
     """Write one page a trial (report.html in its folder, or NAME.html in ``folder``).
 
     Several trials also give a season page, season.html in ``folder`` or in the current folder, with
     its table season.csv. pages False: the season alone, with links to the pages that are there.
-    also: PDF, figures as files, Parquet. Yields each file as it is written.
+    archived: trials that were taken out of lists are in the season too. also: PDF, figures as
+    files, Parquet. Yields each file as it is written.
     """
     from olivevib.report import Also, write_season_report, write_trial_report
 
@@ -103,4 +105,4 @@ def report(
     if len(trials) > 1 or not pages:
         season = Path(folder or ".") / "season.html"
         season.parent.mkdir(parents=True, exist_ok=True)
-        yield from write_season_report(named, season, tick, also)
+        yield from write_season_report(named, season, tick, also, archived)

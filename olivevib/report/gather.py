@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import olivevib
+from olivevib.comparison import Verdict
 from olivevib.errors import Caution
 from olivevib.files.store import read_header
 from olivevib.report.content import ReportContent
@@ -69,7 +70,7 @@ def entry_of(trial: Trial, link: str = "") -> SeasonEntry:
         sensor_lines=tuple(
             CommonLine(
                 trial.name, x.f_hz, x.optical_m_s2, x.optical_sigma_m_s2, x.sensor_m_s2,
-                x.sensor_sigma_m_s2,
+                x.sensor_sigma_m_s2, c.verdict in (Verdict.AGREES, Verdict.DIFFERS),
             )
             for c in trial.comparison
             for x in c.lines

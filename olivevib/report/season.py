@@ -9,11 +9,19 @@ from typing import Any
 
 from olivevib.progress import Tick, silent
 from olivevib.report.clean import clean
-from olivevib.report.figures.agreement import FEWEST, CommonLine, agreement, limits_of_agreement
+from olivevib.report.figures.agreement import (
+    FEWEST,
+    MOST_SIGMA,
+    CommonLine,
+    agreement,
+    counts,
+    limits_of_agreement,
+)
 from olivevib.report.figures.boxes import boxes
 from olivevib.report.outliers import outliers
 from olivevib.report.page import environment
 from olivevib.report.plates import Plate
+from olivevib.report.season_trouble import Trouble, problems, trouble, trouble_words
 from olivevib.report.words import NOT_KNOWN, count, known, measure
 
 QUANTITIES = (
@@ -51,6 +59,11 @@ class SeasonEntry:
         value = (self.record.get(section) or {}).get(key)
         return clean(value, 40) if value not in (None, "") else NOT_KNOWN
 
+    @property
+    def trouble(self) -> Trouble | None:
+        """What of it failed, has not run or is out of date."""
+        return trouble(self.name, self.summary.get("stages") or {})
+
     def markers(self) -> list[Mapping[str, Any]]:
         """The summary of each marker, with what the table knows beyond it."""
         more = {row["marker"]: row for row in self.table if row["headline"]}
@@ -82,8 +95,13 @@ def _set_hz(entry: SeasonEntry) -> str:
     return f"{value:5.1f} Hz" if known(value) else NOT_KNOWN
 
 
-def render_season(entries: Sequence[SeasonEntry], tick: Tick = silent) -> str:
-    """All trials as one HTML document; the table first, then the box plots."""
+def render_season(
+    entries: Sequence[SeasonEntry], tick: Tick = silent, left_out: Sequence[str] = ()
+) -> str:
+    """All trials as one HTML document; the table first, then the box plots.
+
+    left_out: names of archived trials, which are told and not shown.
+    """
     template = environment().get_template("season.html.j2")
     by_quantity: dict[str, list[Plate]] = defaultdict(list)
     for plate in season_plates(entries, tick):
@@ -91,6 +109,7 @@ def render_season(entries: Sequence[SeasonEntry], tick: Tick = silent) -> str:
     markers = sum(len(e.markers()) for e in entries)
     lines = [line for e in entries for line in e.sensor_lines]
     links = {clean(e.name, 60): clean(e.link) for e in entries}
+    troubled = [e.trouble for e in entries if e.trouble]
     return template.render(
         name=f"{count(len(entries), 'trial')}, {count(markers, 'marker')}",
         rows=[season_row(e) for e in entries],
@@ -99,19 +118,39 @@ def render_season(entries: Sequence[SeasonEntry], tick: Tick = silent) -> str:
         agreement_words=_agreement_words(lines),
         outliers=outliers(row for e in entries for row in e.table),
         links=links,
+        troubled=troubled,
+        trouble_words=trouble_words(troubled, len(entries)),
+        left_out=", ".join(clean(name, 60) for name in left_out),
+        left_out_count=count(len(left_out), "archived trial"),
         simulated=sum(e.simulated for e in entries),
         total=len(entries),
     )
 
 
 def _agreement_words(lines: Sequence[CommonLine]) -> str:
-    """What the figure of all trials says in a sentence."""
-    trials = len({line.trial for line in lines})
-    words = f"{count(len(lines), 'line')} of {count(trials, 'trial')}."
-    if len(lines) < FEWEST:
-        return words + " Limits of agreement need three lines."
-    middle, low, high = (measure(v, "%", digits=2) for v in limits_of_agreement(lines))
-    return words + f" Camera less sensor: {middle} on average, 95 % of lines from {low} to {high}."
+    """What the figure of all trials says: which lines count, the limits, and what the rest does."""
+    strong = [line for line in lines if counts(line)]
+    trials = len({line.trial for line in strong})
+    known_to = f"{100 * MOST_SIGMA:.0f} %"
+    words = (
+        f"{count(len(strong), 'line')} of {count(trials, 'trial')} count: those whose amplitude"
+        f" camera and accelerometer each know to {known_to}."
+    )
+    if len(strong) < FEWEST:
+        words += f" Limits of agreement need {FEWEST} such lines."
+    else:
+        middle, low, high = (measure(v, "%", digits=2) for v in limits_of_agreement(strong))
+        words += f" Camera less sensor: {middle} on average, 95 % of them from {low} to {high}."
+    weak = [abs(x.optical_m_s2 - x.sensor_m_s2) for x in lines if x.decided and not counts(x)]
+    if weak:
+        words += (
+            f" {count(len(weak), 'weaker line')} (drawn hollow) count in no limit: there both"
+            f" differ by {measure(max(weak), 'm/s2', digits=2)} at most."
+        )
+    undecided = dict.fromkeys(clean(line.trial, 60) for line in lines if not line.decided)
+    if undecided:
+        words += f" Nor does a trial whose comparison is undecided: {', '.join(undecided)}."
+    return words
 
 
 def season_row(entry: SeasonEntry) -> tuple[str, ...]:
@@ -139,7 +178,7 @@ def season_row(entry: SeasonEntry) -> tuple[str, ...]:
         shaken,
         measure(calibration.get("holdout_rms_percent"), "%", digits=2),
         clean(comparison.get("verdict") or "not compared", 30),
-        str(len(entry.summary.get("warnings") or [])),
+        problems(entry.trouble, len(entry.summary.get("warnings") or [])),
     )
 
 

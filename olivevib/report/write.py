@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
+from olivevib.errors import UsageError
 from olivevib.files.atomic import write_bytes_atomic, write_text_atomic
 from olivevib.files.exports.parquet import parquet_bytes, require_pyarrow
 from olivevib.progress import Tick, silent
@@ -74,17 +75,28 @@ def write_season_report(
     target: Path,
     tick: Tick = silent,
     also: Also = Also(),
+    archived: bool = False,
 ) -> tuple[Path, ...]:
     """Write one page over several trials; each trial comes with its own page's file, or None.
 
     The table links to these pages by relative address where they lie at or below the season page.
     Beside the page stands its table as CSV (and Parquet). Returns the files, the page first.
+    Archived trials are in neither, but named on the page, unless ``archived``; UsageError where
+    no other is left.
     """
+    shown = [t for t in trials if archived or not t[0].settings.session.archived]
+    left_out = [t[0].name for t in trials if not archived and t[0].settings.session.archived]
+    if not shown:
+        raise UsageError(
+            "all of these trials are archived: the season has none to show.",
+            "An archived trial is left out of lists.",
+            "Take them in with --archived, or back with: olivevib archive TRIAL --undo",
+        )
     entries = []
-    for done, (trial, page) in enumerate(trials):
-        tick(done, len(trials), f"reading {trial.name}")
+    for done, (trial, page) in enumerate(shown):
+        tick(done, len(shown), f"reading {trial.name}")
         entries.append(entry_of(trial.readable(), _link(page, target.parent) if page else ""))
-    write_text_atomic(target, render_season(entries, tick))
+    write_text_atomic(target, render_season(entries, tick, left_out))
     rows = [row for entry in entries for row in entry.table]
     paths = [target, target.with_suffix(".csv")]
     write_text_atomic(paths[1], table_csv(rows))
