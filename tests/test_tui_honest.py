@@ -73,6 +73,7 @@ async def test_a_failure_is_told_whole_in_the_list_on_the_trial_and_behind_enter
         pane = flat(str(app.screen.query_one("#warning-text").render()))
         for part in (f"✗ reconstruct failed: {FAULT.what}", FAULT.why, f"Next: {FAULT.remedy}"):
             assert part in pane
+        assert pane.count("✗") == 1  # what only waits for it is not a failure of its own
         await press(pilot, "down", "down", "enter")
         assert isinstance(app.screen, ErrorScreen)
         sheet = flat(str(app.screen.query_one(".dialog > Static").render()))

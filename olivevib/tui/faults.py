@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -11,6 +12,8 @@ from olivevib.errors import InputError, OlivevibError
 if TYPE_CHECKING:
     from olivevib.trial import Trial
     from olivevib.trial.quality import StageLine
+
+BY_ANOTHER = re.compile(r"(\w+) is (?:stale|failed|blocked|missing|skipped)")
 
 
 class Fault(NamedTuple):
@@ -30,7 +33,7 @@ def faults_of(trial: Trial, stages: Iterable[StageLine]) -> tuple[Fault, ...]:
         error: object = None
         if stage.state == "failed":
             error = _kept(trial, stage)
-        elif stage.state == "blocked":
+        elif stage.state == "blocked" and not BY_ANOTHER.fullmatch(stage.reason):
             error = guarded(partial(trial.fingerprint, stage.name))
         if isinstance(error, OlivevibError):
             found.setdefault(error.what, Fault(stage.name, stage.state, error))

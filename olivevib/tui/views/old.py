@@ -6,11 +6,11 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from olivevib.tui.faults import BY_ANOTHER
 from olivevib.tui.harmless import harmless
 from olivevib.tui.views.words import GLYPHS
 
 OLD = GLYPHS["stale"]
-_EARLIER = re.compile(r"(\w+) is (?:stale|failed|blocked|missing|skipped)")
 _CHANGED = re.compile(r"(?:the setting )?(.+) changed")
 
 
@@ -23,7 +23,7 @@ def old_words(summary: Mapping[str, Any], *names: str) -> str:
     name = next((n for n in names if stages[n]["state"] != "done"), "")
     if not name:
         return ""
-    while (before := _EARLIER.fullmatch(stages[name]["reason"])) and before[1] in stages:
+    while (before := BY_ANOTHER.fullmatch(stages[name]["reason"])) and before[1] in stages:
         name = before[1]
     state, reason = stages[name]["state"], harmless(stages[name]["reason"], 120)
     changed = _CHANGED.fullmatch(reason)
