@@ -60,6 +60,11 @@ def _explain(error: Exception, console: Console) -> int:
     if isinstance(error, OlivevibError):
         console.error(error.what, error.why, error.remedy)
         return error.exit_code
+    if isinstance(error, PermissionError) and error.filename:
+        place = error.filename
+        remedy = "Check the rights of the file and its folder, or work in a folder of your own."
+        console.error(f"{place} may not be read or written.", error.strerror or "", remedy)
+        return FAILED
     console.error(
         f"olivevib met an unforeseen error: {type(error).__name__}: {error}",
         "This is a fault of the program, not yours; nothing that was measured is lost.",

@@ -54,11 +54,10 @@ def new(arguments: argparse.Namespace, console: Console) -> int:
         ),
         preset=find_preset(arguments.preset, Path()) if arguments.preset else None,
         link=arguments.link,
+        settings=values.settings(arguments.set),
     )
     folder = place_for_new(arguments.trial, Path())
     trial = pipeline.new_trial(folder, plan, console.tick)
-    changes = values.settings(arguments.set)
-    trial = trial.changed(changes) if changes else trial
     for words in pipeline.unsaid(plan):
         console.say(f"  not said: {words}")
     console.say(f"made {trial.folder}; describe it in {trial.folder / 'trial.toml'}")

@@ -17,6 +17,7 @@ def simulate(arguments: argparse.Namespace, console: Console) -> int:
     """Record a named scenario into a new trial folder, or list the scenarios."""
     from olivevib.pipeline.simulated import simulated_trial, truth_folder
     from olivevib.simulation import SCENARIOS
+    from olivevib.trial.workspace import named
 
     if arguments.list:
         for scenario in SCENARIOS:
@@ -28,7 +29,7 @@ def simulate(arguments: argparse.Namespace, console: Console) -> int:
             "",
             "Write: olivevib simulate DIR --scenario NAME   (olivevib simulate --list)",
         )
-    folder = Path(arguments.dir)
+    folder = named(Path(arguments.dir))
     simulated_trial(folder, arguments.scenario, arguments.seed, console.tick)
     console.say(f"recorded {folder}; the truth stands apart in {truth_folder(folder)}")
     console.say(f"Next: olivevib run {folder}")
@@ -40,9 +41,10 @@ def demo(arguments: argparse.Namespace, console: Console) -> int:
     from olivevib import pipeline
     from olivevib.pipeline.simulated import simulated_trial, truth_folder
     from olivevib.pipeline.truth import compare_with_truth
+    from olivevib.trial.workspace import named
 
     name = "beyond" if arguments.beyond else "demo"
-    folder = Path(arguments.dir or name)
+    folder = named(Path(arguments.dir or name))
     console.say(f"A simulated trial in {folder}: rendered, then measured as if it were recorded.")
     trial = simulated_trial(folder, name, arguments.seed, console.tick, arguments.seconds)
     warned = 0

@@ -21,6 +21,8 @@ from olivevib.pipeline.recordings import SIDES
 from olivevib.pipeline.sensor_plan import SensorPlan
 from olivevib.progress import Tick, silent
 from olivevib.trial import Trial
+from olivevib.trial.document import change_settings
+from olivevib.trial.workspace import named
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,7 @@ class NewTrial:
 
     places, sizes_mm: where single markers sit and their own size, where somebody knows it already.
     accelerometer, accelerometer_marker: one sensor; sensors: as many as there are, told in full.
+    settings: dotted keys of trial.toml, such as {"detection.fill": 0.7}.
     """
 
     left: str
@@ -54,6 +57,7 @@ class NewTrial:
     places: Mapping[int, str] = field(default_factory=dict)
     sizes_mm: Mapping[int, float] = field(default_factory=dict)
     sensors: tuple[SensorPlan, ...] = ()
+    settings: Mapping[str, object] = field(default_factory=dict)
 
     @property
     def every_sensor(self) -> tuple[SensorPlan, ...]:
@@ -68,13 +72,14 @@ def new_trial(folder: Path, plan: NewTrial, tick: Tick = silent) -> Trial:
 
     Raises InputError or UsageError before anything is written; the folder appears whole or not.
     """
+    folder = named(folder)
     check_plan(plan)
     part = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(part, ignore_errors=True)
     try:
         part.mkdir(parents=True)
-        places = _place(part, folder, plan, tick)
-        (part / FILE).write_text(tomlkit.dumps(_document(plan, places)), encoding="utf-8")
+        _describe(part, plan, _Places(_wanted(plan)))  # a fault in it is told before the copying
+        _describe(part, plan, _place(part, folder, plan, tick))
         if folder.exists():
             _merge_into(part, folder)
         else:
@@ -84,6 +89,18 @@ def new_trial(folder: Path, plan: NewTrial, tick: Tick = silent) -> Trial:
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return Trial.open(folder)
+
+
+def _describe(part: Path, plan: NewTrial, places: _Places) -> None:
+    """Write trial.toml; UsageError where a setting of the plan is none."""
+    (part / FILE).write_text(tomlkit.dumps(_document(plan, places)), encoding="utf-8")
+    if not plan.settings:
+        return
+    try:
+        change_settings(part, plan.settings)
+    except UsageError as error:
+        what = f"cannot set {', '.join(plan.settings)}:"
+        raise UsageError(what, error.why, "Nothing was made; correct it and try again.") from error
 
 
 def _merge_into(part: Path, folder: Path) -> None:

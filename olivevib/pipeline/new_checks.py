@@ -73,6 +73,10 @@ def unsaid(plan: NewTrial) -> tuple[str, ...]:
         )
     if not plan.ids and not _small(plan.markers):
         out.append("marker ids (--ids 1-8): every id of this large library counts as a marker")
+    if any(sensor.marker is None for sensor in plan.every_sensor):
+        out.append(
+            "the accelerometer's marker (--accelerometer-marker ID): it is compared with nothing"
+        )
     if plan.exposure_ms is None:
         out.append("exposure (--exposure MS): amplitudes keep what blur takes away")
     if plan.band_hz is None:

@@ -11,6 +11,7 @@ from olivevib.pipeline.new import NewTrial, new_trial
 from olivevib.progress import Tick, silent
 from olivevib.simulation import SimulatedTrial, scenario, simulate
 from olivevib.trial import Trial
+from olivevib.trial.workspace import named
 
 
 def truth_folder(folder: Path) -> Path:
@@ -26,6 +27,7 @@ def simulated_trial(
     The trial holds what a technician would have and nothing else; it is labelled simulated.
     UsageError for an unknown scenario or a folder that is a trial already.
     """
+    folder = named(folder)
     if (folder / FILE).exists():
         raise UsageError(
             f"{folder} is a trial already.", "", "Choose another folder, or remove it yourself."

@@ -5,17 +5,35 @@ from __future__ import annotations
 from pathlib import Path
 
 from olivevib.errors import UsageError
+from olivevib.files.atomic import as_input_error
 from olivevib.files.trial_folders import FILE, list_trials
 
 FOLDERS = ("trials", "reports", "markers")
 
 
 def make_workspace(folder: Path) -> list[Path]:
-    """Create the three folders where they are missing; returns those that were made."""
+    """Create the three folders where they are missing; returns those that were made.
+
+    InputError where the disk refuses them.
+    """
     made = [folder / name for name in FOLDERS if not (folder / name).is_dir()]
     for path in made:
-        path.mkdir(parents=True)
+        try:
+            path.mkdir(parents=True)
+        except OSError as error:
+            raise as_input_error(error, path) from error
     return made
+
+
+def named(folder: Path) -> Path:
+    """The folder by a name of its own, where it was given as ``.`` or ``..``.
+
+    UsageError for the root of a disk: beside it nothing can stand.
+    """
+    whole = folder if folder.name not in ("", "..") else folder.resolve()
+    if not whole.name:
+        raise UsageError(f"{folder} cannot be a trial.", "", "Name a folder of your own.")
+    return whole
 
 
 def find_trial(name: str, workspace: Path) -> Path:

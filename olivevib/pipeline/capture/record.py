@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import asdict
@@ -54,8 +54,13 @@ def capture(
     """
     library = only_known(load_library(plan.markers), () if plan.board else plan.ids)
     board = None if plan.board is None else parse_board(plan.board)
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
     _check(folder, plan)
-    cameras, reopen = _open(plan, tick)
+    try:
+        cameras, reopen = _open(plan, tick)
+    except BaseException:
+        _leave(made)
+        raise
 
     def looker(runners: Mapping[str, CameraRunner]) -> Looker:
         return Looker(runners, library, board)
@@ -70,7 +75,7 @@ def capture(
     finally:
         session.finish()
         if not videos:
-            _leave(folder)
+            _leave(made)
     session.join(tick)
     verdict = session.judge()
     with suppress(InputError):  # no room: what was written at the start stays
@@ -79,10 +84,11 @@ def capture(
     return Captured(folder, there, verdict, session.error)
 
 
-def _leave(folder: Path) -> None:
-    """Take away the folder that was made for nothing; one with anything in it stays."""
+def _leave(made: Sequence[Path]) -> None:
+    """Take away the folders that were made for nothing; one with anything in it stays."""
     with suppress(OSError):
-        folder.rmdir()
+        for folder in made:
+            folder.rmdir()
 
 
 def _check(folder: Path, plan: CapturePlan) -> None:
