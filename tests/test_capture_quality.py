@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,11 +28,15 @@ from olivevib.pipeline.capture import (
     judge,
     rehearsal,
 )
+from olivevib.pipeline.capture.known import known_readout_s
 from olivevib.pipeline.capture.looks import grey_of_shot, look_at
 from olivevib.pipeline.capture.prompts import MotionSense
-from olivevib.pipeline.capture.verdict import camera_offset_s, judge_board
+from olivevib.pipeline.capture.verdict import camera_offset_s, judge_board, known_setup
+from olivevib.planning import Setup, outlook, reach
+from olivevib.planning.words import frequencies
 from olivevib.signals import fit_stamps
 from olivevib.studies.capture.camera import jpeg
+from olivevib.trial.camera_book import CameraMode, Entry, remember
 
 LIBRARY = load_library("olive49")
 
@@ -260,7 +265,8 @@ def judged(**more):
 
 def test_a_good_recording_is_praised_in_one_sentence():
     told = judged()
-    assert told.words.startswith("8 of 8 markers, 0 drops, cameras 9.3 ms apart: good for 5–45 Hz")
+    start = "8 of 8 markers, 0 drops, cameras 9.3 ms apart: good for 5–29.6, 30.4–45 Hz"
+    assert told.words.startswith(start)
     assert told.cautions == ()
     assert told.offset_s == pytest.approx(0.0093)
 
@@ -297,14 +303,61 @@ def test_the_offset_between_the_cameras_is_within_half_a_frame():
         assert camera_offset_s(left, right) == pytest.approx(late, abs=1e-9)
 
 
+def steady(fps):
+    return fit_stamps(np.arange(int(10 * fps) + 1) / fps)
+
+
+def said(fps, offset_s, band_hz=None, readout_s=None):
+    return good_for(known_setup((steady(fps), steady(fps)), offset_s, band_hz, readout_s))
+
+
 def test_what_a_pair_of_cameras_is_good_for():
-    assert good_for(120.0, 0.002, (5.0, 45.0)) == "good for 5–45 Hz"
-    assert "except 27.5–32.5 Hz (cameras in step)" in good_for(30.0, 0.0005, (5.0, 45.0))
-    assert "except 29.7–30.3 Hz" in good_for(30.0, 0.0093, (5.0, 45.0))
-    assert "f and 60 - f look alike" in good_for(30.0, 0.0165, (5.0, 45.0))
-    assert good_for(30.0, math.nan, (5.0, 45.0)) == "good for 5–15 Hz"
-    assert "5–22.5 Hz" in good_for(15.0, 0.012, (5.0, 45.0))
-    assert good_for(0.0, math.nan, (5.0, 45.0)) == "nothing was recorded"
+    assert said(120.0, 0.002, (5.0, 45.0)) == "good for 5–45 Hz (direct)"
+    assert said(30.0, math.nan, (5.0, 14.0)) == "good for 5–14 Hz (direct)"
+    step = said(30.0, 0.0)
+    assert step.startswith(
+        "good for no frequency of 5–45 Hz for sure; ambiguous 5–14.6, 15.4–27.4,"
+    )
+    assert "blind 14.7–15.3, 27.5–32.5, 44.7–45 Hz" in step
+    assert "the row time is not known, and the cameras are not 8-13 ms apart" in step
+    assert "a band declared below 15 Hz would be direct" in step
+    known = said(30.0, 0.0, None, 0.02)  # the book knows the rows: they decide
+    assert "good for 5–9.6, 10.4–14.6, 15.4–19.6, 20.4–27.4, 32.6–39.6" in known
+    assert "blind 27.5–32.5 Hz" in known
+    apart = said(30.0, 0.0093)
+    assert "good for 5–29.6, 30.4–45 Hz (confirmable from" in apart
+    assert said(30.0, math.nan).startswith("good for no frequency of 5–45 Hz")
+    assert good_for(known_setup((None, None), math.nan, None, None)) == "nothing was recorded"
+
+
+@pytest.mark.parametrize("offset_s", [math.nan, 0.0, 0.0093, 0.0165])
+@pytest.mark.parametrize("readout_s", [None, 0.0, 0.02])
+def test_the_verdict_is_that_of_the_plan(offset_s, readout_s):
+    """Each line of ``olivevib plan``'s table lies in the range that the verdict names."""
+    offset = None if math.isnan(offset_s) else offset_s
+    planned = Setup(fps=30.0, readout_s=readout_s, offset_s=offset, seconds=10.0)
+    setup = known_setup((steady(30.0), steady(30.0)), offset_s, None, readout_s)
+    assert setup is not None
+    ranges = reach(setup)
+    for f_hz in frequencies(None):
+        status = outlook(planned, f_hz).status
+        holding = [s for s, spans in ranges.items() if any(a <= f_hz <= b for a, b in spans)]
+        assert holding == [status], f_hz
+
+
+def test_the_book_of_cameras_tells_the_verdict_the_row_times(tmp_path):
+    (tmp_path / "trials/T1").mkdir(parents=True)
+    mode = CameraMode("Webcam", (1280, 720), 30.0)
+    facts = {
+        side: CameraFacts(side, "Webcam", "", "v4l2", "mjpeg", "", (1280, 720), 30.0, "kernel")
+        for side in ("left", "right")
+    }
+    results = [_result("left"), _result("right")]
+    assert known_readout_s(tmp_path / "trials/T1", facts, results) is None
+    remember(tmp_path, Entry(mode, -27.0, 0.1, "led"))
+    assert known_readout_s(tmp_path / "trials/T1", facts, results) == pytest.approx(27e-6 * 720)
+    facts["right"] = replace(facts["right"], title="Another")
+    assert known_readout_s(tmp_path / "trials/T1", facts, results) is None
 
 
 # --- all of it, live

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,11 +11,13 @@ import tui_scene as scene
 from rich.style import Style
 from textual.widgets import DataTable
 from tui_app import press, screen_text, started
+from tui_live import live
 
 from olivevib.errors import InputError
 from olivevib.trial import Trial
 from olivevib.trial.stages import BY_NAME, write_failure
 from olivevib.tui.screens.error import ErrorScreen
+from olivevib.tui.views.live import state_text
 from olivevib.tui.views.of_results import orbits_of
 from olivevib.tui.views.old import old_words
 from olivevib.tui.views.palette import Palette
@@ -202,3 +205,12 @@ def test_offset_and_orbits_are_told_as_far_as_they_are_known(measured):
     assert path is not None
     size = told["markers"][0]["displacement_pp_mm"]
     assert orbits_of(path, None, told)[0].caption == f"trunk · {size:.1f} mm"
+
+
+def test_cameras_in_step_are_said_to_be_in_step():
+    step, apart = (
+        state_text(replace(live(4.0), offset_s=offset), Palette()).plain
+        for offset in (0.00001, -0.0093)
+    )
+    assert "cameras in step (0.0 ms apart)" in step
+    assert "cameras 9.3 ms apart ·" in apart

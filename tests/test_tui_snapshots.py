@@ -172,7 +172,7 @@ async def test_a_running_capture_looks_as_it_did(svg, workspace, size, monkeypat
             if not await looks(app, pilot, svg(name=name_of(f"live {name}", size))):
                 changed.append(name)
         cautions = (Caution("dropped-frames", "The left camera skipped 3 of 600 frames.", "Use …"),)
-        words = "8 of 8 markers, 3 drops, cameras 9.3 ms apart: good for 5–45 Hz"
+        words = "8 of 8 markers, 3 drops, cameras 9.3 ms apart: good for 5–29.6, 30.4–45 Hz"
         page.post_message(LivePage.Over(Recorded(words, cautions, workspace / "trials/T09", None)))
         await settle(pilot)
         if not await looks(app, pilot, svg(name=name_of("live verdict", size))):

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 from olivevib.planning.setup import FLOOR_PX, LOCALISER_PX, POINTS, Setup
-from olivevib.planning.zones import BAND_HZ, Zone, zone_of, zones
+from olivevib.planning.zones import BAND_HZ, SWAY_HZ, Zone, zone_of, zones
 from olivevib.vibration.verdict import candidates, fold
 
 LEAST_CONTRAST_PX = 0.08  # from which the branch is confirmed
@@ -59,7 +59,8 @@ def outlook(setup: Setup, f_hz: float, amplitude_mm: float = 3.0) -> Outlook:
         raise ValueError(f"frequency and amplitude must be above 0: {f_hz}, {amplitude_mm}")
     band = setup.band_hz or (min(BAND_HZ[0], f_hz), max(BAND_HZ[1], f_hz))
     around = (min(band[0], f_hz), max(band[1], f_hz))
-    all_zones = zones(setup.fps, setup.apart, setup.seconds, around, setup.row_time_s > 0)
+    near = (around[0] - SWAY_HZ, around[1] + SWAY_HZ)  # a zone may reach in from outside
+    all_zones = zones(setup.fps, setup.apart, setup.seconds, near, setup.row_time_s > 0)
     zone = None if setup.direct else zone_of(f_hz, all_zones)
     contrast = setup.contrast_px(amplitude_mm)
     least = least_amplitude_mm(setup)
@@ -161,7 +162,7 @@ def _status(
         return "ambiguous", tuple(words)
     others = " or ".join(f"{f:.4g}" for f in aliases)
     if math.isinf(least):
-        return "ambiguous", (*words, f"{others} Hz look the same: {_nothing(setup)}.")
+        return "ambiguous", (*words, f"{others} Hz look the same: {why_alike(setup)}.")
     if amplitude_mm < least:
         why = f"{others} Hz look the same: {amplitude_mm:g} mm are less than the {least:.2f} mm"
         return "ambiguous", (*words, f"{why} from which the row times decide.")
@@ -171,7 +172,8 @@ def _status(
     return "confirmable", (*words, f"{by} it from its aliases, once measured.")
 
 
-def _nothing(setup: Setup) -> str:
+def why_alike(setup: Setup) -> str:
+    """Why nothing in this setup could tell a frequency from its aliases."""
     if setup.readout_s is None:
         return "the row time is not known, and the cameras are not 8-13 ms apart"
     return "all rows are seen at once, and the cameras are not 8-13 ms apart"

@@ -15,6 +15,7 @@ import numpy as np
 
 from olivevib.errors import InputError, OlivevibError
 from olivevib.files.capture import Beat, Camera, CameraRunner, DiskFull, RunnerState, join_parts
+from olivevib.pipeline.capture.known import known_readout_s
 from olivevib.pipeline.capture.looker import Looker
 from olivevib.pipeline.capture.looks import advise
 from olivevib.pipeline.capture.plan import (
@@ -165,7 +166,9 @@ class Session:
         results = [self._result(side) for side in SIDES]
         if self.plan.board is not None:
             return judge_board(results, self.looker.coverage() if self.looker else None)
-        return judge(results, self.plan.band_hz, self.plan.ids)
+        facts = {side: runner.facts for side, runner in self.runners.items()}
+        readout = known_readout_s(self._folder, facts, results)
+        return judge(results, self.plan.band_hz, self.plan.ids, readout)
 
     def _result(self, side: str) -> CameraResult:
         runner = self.runners[side]

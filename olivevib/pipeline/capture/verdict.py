@@ -12,13 +12,12 @@ from olivevib.arrays import Floats
 from olivevib.calibration.guidance import Guidance
 from olivevib.errors import Caution
 from olivevib.pipeline.capture.looks import BLUR_PX, SATURATED_SHARE
+from olivevib.planning import Setup, reach_words, step_words
 from olivevib.signals import StampFit, fit_stamps
 
-BAND_HZ = (5.0, 45.0)
 SLOW_SHARE = 0.95  # of the promised frame rate
 SEEN_SHARE = 0.5  # of the looks in which a marker must have been seen by both cameras
 LEAST_S = 8.0
-IN_STEP, HALF_STEP = 0.08, 0.08  # of a frame: nearer to 0 or to a half than that helps less
 
 
 @dataclass(frozen=True)
@@ -54,11 +53,15 @@ class Verdict:
 
 
 def judge(
-    results: Sequence[CameraResult], band_hz: tuple[float, float] | None, wanted: Sequence[int]
+    results: Sequence[CameraResult],
+    band_hz: tuple[float, float] | None,
+    wanted: Sequence[int],
+    readout_s: float | None = None,
 ) -> Verdict:
     """The verdict on both cameras' recordings of a tree.
 
     wanted: the ids that hang on the tree, empty if nobody said so: then those that were seen.
+    readout_s: from the first to the last row, None where nobody measured it.
     """
     fits = {r.side: _fit(r.stamps_s) for r in results}
     both = [fits.get(side) for side in ("left", "right")]
@@ -72,11 +75,10 @@ def judge(
     dropped = sum(int(f.dropped.size) for f in fits.values() if f is not None)
     parts = [f"{len(seen)} of {len(known)} markers"] if any(r.looks for r in results) else []
     parts.append(f"{dropped} drops")
-    if math.isfinite(offset):
-        parts.append(f"cameras {abs(offset) * 1000:.1f} ms apart")
-    fps = min((f.rate_hz for f in fits.values() if f is not None), default=0.0)
-    reach = good_for(fps, offset, band_hz or BAND_HZ)
-    return Verdict(f"{', '.join(parts)}: {reach}", offset, fits, tuple(cautions))
+    setup = known_setup(tuple(fits.values()), offset, band_hz, readout_s)
+    if setup is not None and setup.offset_s is not None:
+        parts.append(step_words(setup))
+    return Verdict(f"{', '.join(parts)}: {good_for(setup)}", offset, fits, tuple(cautions))
 
 
 def judge_board(results: Sequence[CameraResult], coverage: Guidance | None) -> Verdict:
@@ -117,35 +119,31 @@ def camera_offset_s(left: StampFit, right: StampFit) -> float:
     return float(turn / (2 * np.pi) * period)
 
 
-def good_for(fps: float, offset_s: float, band_hz: tuple[float, float]) -> str:
-    """What frequencies two cameras with this rate and offset can measure, in words.
+def good_for(setup: Setup | None) -> str:
+    """What two cameras like these can measure: the words of ``olivevib plan`` for what is known.
 
-    Above half the frame rate a line is decided by the instants of the sensor rows and by the
-    offset between the cameras; in step, the frame rate's neighbourhood looks like sway, and half
-    a frame apart f looks like 2 fps - f (knowledge of the field: sampling time, 5.3 and 10).
+    None: nothing was recorded.
     """
-    low, high = band_hz
-    if fps <= 0:
-        return "nothing was recorded"
-    if fps >= 2 * high:
-        return f"good for {low:g}–{high:g} Hz"
-    direct = fps / 2
-    limit = min(high, 1.5 * fps)
-    if math.isnan(offset_s):
-        return f"good for {low:g}–{direct:.0f} Hz"
-    share = abs(offset_s) * fps
-    if limit <= fps * 11 / 12:
-        blind = ""
-    elif share < IN_STEP:
-        blind = f" except {fps * 11 / 12:.1f}–{min(limit, fps * 13 / 12):.1f} Hz (cameras in step)"
-    else:
-        blind = f" except {fps - 0.3:.1f}–{fps + 0.3:.1f} Hz"
-    if share > 0.5 - HALF_STEP:
-        blind += f"; half a frame apart, f and {2 * fps:.0f} - f look alike"
-    return (
-        f"good for {low:g}–{limit:g} Hz{blind} "
-        f"(above {direct:.0f} Hz it takes rolling shutters with known row times)"
-    )
+    return reach_words(setup) if setup is not None else "nothing was recorded"
+
+
+def known_setup(
+    fits: Sequence[StampFit | None],
+    offset_s: float,
+    band_hz: tuple[float, float] | None,
+    readout_s: float | None,
+) -> Setup | None:
+    """The recording as a plan; offset NaN and readout None: unknown. None without two frames."""
+    there = [fit for fit in fits if fit is not None]
+    if not there:
+        return None
+    fps = round(min(fit.rate_hz for fit in there), 3)  # no clock of a computer tells more
+    seconds = min(float(np.ptp(fit.t_s)) for fit in there)
+    if not (fps > 0 and seconds > 0):
+        return None
+    offset = offset_s if math.isfinite(offset_s) else None
+    longest = None if readout_s is None else min(abs(readout_s), 1 / fps)
+    return Setup(fps=fps, readout_s=longest, offset_s=offset, band_hz=band_hz, seconds=seconds)
 
 
 def _markers(results: Sequence[CameraResult], wanted: Sequence[int]) -> tuple[list[int], list[int]]:

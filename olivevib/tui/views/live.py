@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.text import Text
 
+from olivevib.planning import Setup, step_words
 from olivevib.tui.harmless import harmless
 from olivevib.tui.views.palette import Palette
 from olivevib.tui.views.picture import Outline
@@ -69,7 +70,9 @@ def state_text(state: CaptureState, palette: Palette) -> Text:
         _append_camera(out, side, camera, palette)
     parts = []
     if math.isfinite(state.offset_s):
-        parts.append(f"cameras {abs(state.offset_s) * 1000:.1f} ms apart (of a frame)")
+        rates = [c.fps for c in state.cameras.values() if math.isfinite(c.fps) and c.fps > 0]
+        setup = Setup(fps=min(rates, default=30.0), offset_s=state.offset_s)
+        parts.append(step_words(setup))
     parts.append(f"{state.free_bytes / 1e9:.0f} GB free")
     if math.isfinite(state.minutes_left):
         parts.append(f"{state.minutes_left:.0f} minutes left")
