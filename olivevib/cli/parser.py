@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from olivevib import __version__
+from olivevib.cli.arguments import Parser
 
 STAGE_VERBS = {
     "calibrate": "both lenses and the pair from recordings of a board -> rig.toml",
@@ -29,9 +30,10 @@ exit codes: 0 done, 1 failed, 2 wrong use, 3 done with quality warnings, 130 can
 
 def build_parser() -> argparse.ArgumentParser:
     """The whole command line."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="olivevib",
-        description="Measure the vibration of a shaken olive tree with two webcams.",
+        description="Measure the vibration of a shaken olive tree with two webcams.\n"
+        "olivevib alone opens the app on the workspace here.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -11,6 +11,7 @@ from typing import Any, BinaryIO
 from olivevib import values
 from olivevib.cli.console import Console
 from olivevib.errors import OlivevibError
+from olivevib.values import counted
 
 
 def show(arguments: argparse.Namespace, console: Console) -> int:
@@ -19,7 +20,7 @@ def show(arguments: argparse.Namespace, console: Console) -> int:
     from olivevib.trial.summary import summary
 
     if arguments.trial is None:
-        return _list(arguments.json)
+        return _list(arguments.json, console)
     facts = summary(trial_of(arguments.trial, console).readable())
     if arguments.json:
         _out(json.dumps(facts, indent=2, ensure_ascii=False, allow_nan=False))
@@ -30,13 +31,14 @@ def show(arguments: argparse.Namespace, console: Console) -> int:
     return 0
 
 
-def _list(as_json: bool) -> int:
+def _list(as_json: bool, console: Console) -> int:
     """Every trial of the workspace here: its quality word, and why."""
     from olivevib.files.trial_folders import list_trials
     from olivevib.trial import Trial
     from olivevib.trial.quality import quality_of, stage_lines
 
     rows: list[dict[str, Any]] = []
+    archived = 0
     for folder in list_trials(Path()):
         try:
             trial = Trial.open(folder)
@@ -45,6 +47,7 @@ def _list(as_json: bool) -> int:
         except OlivevibError as error:
             rows.append({"trial": folder.name, "quality": "unreadable", "why": error.what})
             continue
+        archived += trial.settings.session.archived
         if not trial.settings.session.archived:
             states = {stage.name: stage.state for stage in stages}
             row = {"trial": trial.name, "quality": quality.word, "why": quality.why}
@@ -53,6 +56,12 @@ def _list(as_json: bool) -> int:
         _out(json.dumps(rows, indent=2, ensure_ascii=False))
     for row in () if as_json else rows:
         _out(f"{row['trial']}  {row['quality']}: {row['why']}")
+    if archived:
+        console.say(f"{counted(archived, 'archived trial')} not shown")
+    elif not rows:
+        console.say(f"No trial is here: none in {Path().resolve() / 'trials'}.")
+        console.say("Change to a workspace, or make a trial: olivevib new TRIAL --left … --right …")
+        console.say("To see one first: olivevib demo")
     return 0
 
 
@@ -102,9 +111,10 @@ def check(arguments: argparse.Namespace, console: Console) -> int:
 
     findings = pipeline.check(folder_of(arguments.trial, console), console.tick)
     for finding in findings:
-        _out(f"{finding.state:8} {finding.what}  {finding.words}".rstrip())
+        words = finding.words.replace("\n", "\n" + " " * 9)
+        _out(f"{finding.state:8} {finding.what}  {words}".rstrip())
     states = {finding.state for finding in findings}
-    return 1 if "lost" in states else 3 if states & {"damaged", "remake"} else 0
+    return 1 if states & {"lost", "faulty"} else 3 if states & {"damaged", "remake"} else 0
 
 
 def _out(text: Any) -> None:

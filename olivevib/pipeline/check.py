@@ -13,6 +13,7 @@ from olivevib.files.rig_file import read_rig
 from olivevib.files.stamps import read_stamp_file
 from olivevib.files.stills import open_source
 from olivevib.files.store import read_stage
+from olivevib.files.trial_folders import FILE
 from olivevib.pipeline.recordings import SIDES
 from olivevib.progress import Tick, silent
 from olivevib.trial import STAGES, Trial
@@ -21,7 +22,11 @@ from olivevib.trial.fingerprints import PRIVATE, RIG
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing in a trial: "whole", "damaged" (usable in part), "remake" (a stage), or "lost"."""
+    """One thing in a trial, and how it is.
+
+    state: "whole", "damaged" (usable in part), "remake" (a stage), "faulty" (there, but it cannot
+    be read as it is) or "lost" (not there).
+    """
 
     state: str
     what: str
@@ -33,7 +38,7 @@ def check(folder: Path, tick: Tick = silent) -> list[Finding]:
     try:
         trial = Trial.open(folder)
     except OlivevibError as error:
-        return [Finding("lost", "trial.toml", f"{error}")]
+        return [_unread(folder / FILE, FILE, error)]
     return [
         _settings(trial),
         *_recordings(trial, tick),
@@ -42,6 +47,11 @@ def check(folder: Path, tick: Tick = silent) -> list[Finding]:
         *_stages(trial),
         *_outputs(trial),
     ]
+
+
+def _unread(path: Path, name: str, error: OlivevibError) -> Finding:
+    """Faulty or lost: a file that is there may be corrected, one that is gone may not."""
+    return Finding("faulty" if path.exists() else "lost", name, f"{error}")
 
 
 def _settings(trial: Trial) -> Finding:
@@ -72,9 +82,16 @@ def _recording(path: Path, name: str, side: str, tick: Tick) -> Finding:
                 tick(frames, None, f"reading {name}")
             cautions = source.cautions
     except OlivevibError as error:
-        return Finding("lost", name, f"{error}")
-    told = "; ".join(c.text for c in cautions)
+        return _unread(path, name, error)
+    told = "; ".join(_without(path, c.text) for c in cautions)
     return Finding("damaged" if told else "whole", name, told or f"{frames} frames")
+
+
+def _without(path: Path, text: str) -> str:
+    """A sentence about a file whose name stands before it already."""
+    for name in (str(path), str(path.resolve())):
+        text = text.removeprefix(name)
+    return text.lstrip(": ").removesuffix(".")
 
 
 def _checksums(path: Path, name: str, tick: Tick) -> Iterator[Finding]:
@@ -84,7 +101,7 @@ def _checksums(path: Path, name: str, tick: Tick) -> Iterator[Finding]:
     try:
         verified = verify(path, tick)
     except OlivevibError as error:
-        yield Finding("lost", f"{name}, checksums", f"{error}")
+        yield _unread(path, f"{name}, checksums", error)
         return
     if verified is not None:
         state = "whole" if verified.whole else "damaged"
@@ -102,7 +119,7 @@ def _stamps(trial: Trial) -> Iterator[Finding]:
             frames = len(frame_stamps(trial.path(camera.video)))
             stamps = read_stamp_file(trial.path(name), camera.video, frames)
         except OlivevibError as error:
-            yield Finding("lost", name, f"{error}")
+            yield _unread(trial.path(name), name, error)
         else:
             yield Finding("whole", name, f"{len(stamps)} stamps")
 
@@ -145,7 +162,7 @@ def _sensors(trial: Trial) -> Iterator[Finding]:
         try:
             record = sensor_record(trial, sensor)
         except OlivevibError as error:
-            yield Finding("lost", sensor.file, f"{error}")
+            yield _unread(trial.path(sensor.file), sensor.file, error)
         else:
             words = f"{record.samples.t_s.size} samples at {record.rate_hz:.2f} Hz"
             yield Finding("whole", sensor.file, words)
