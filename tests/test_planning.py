@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import pytest
 from hypothesis import given, settings
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from olivevib.cli import main
 from olivevib.planning import Setup, advice, outlook, zone_of, zones
+from olivevib.planning.words import one_words, table_words
 
 STANDARD = Setup(readout_s=0.020, offset_s=0.0, marker_mm=50.0)
 
@@ -137,3 +139,49 @@ def test_verb(capsys):
     assert main(["plan", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["frequencies"][0]["false_depth_mm"] is None
     assert main(["plan", "--fps", "0"]) == 2
+
+
+def told(setup: Setup, f_hz: float) -> str:
+    found = outlook(setup, f_hz)
+    return one_words(setup, found, advice(setup, found))
+
+
+def test_an_offset_that_was_given_is_not_called_in_step():
+    words = told(Setup(fps=60.0, readout_s=0.02, offset_s=0.010), 25.0)
+    assert "in step" not in words
+    assert "10 ms is 0.40 of a frame period, too much to take away every zone" in words
+    assert "Start the cameras 4-6.5 ms apart" in words
+    assert "too little" in told(Setup(readout_s=0.02, offset_s=0.005), 25.0)
+    assert "in step, several" in told(Setup(readout_s=0.02, offset_s=0.0), 25.0)
+    assert "--offset MS" in told(Setup(readout_s=0.02), 25.0)
+    assert "half a frame apart" in told(Setup(readout_s=0.02, offset_s=0.0166), 25.0)
+    assert "Start the cameras" not in told(Setup(readout_s=0.02, offset_s=0.010), 25.0)
+
+
+def test_a_direct_frequency_has_no_contrast_and_no_least_amplitude():
+    setup = Setup(fps=120.0, readout_s=0.008, band_hz=(5.0, 45.0))
+    words = told(setup, 25.0)
+    assert "nothing else in the band: nothing to decide" in words
+    for word in ("contrast", "evidence", "least amplitude", "row time that"):
+        assert word not in words
+    line = table_words(setup, [outlook(setup, 25.0)]).splitlines()[-1]
+    assert line.split()[3] == "-"
+
+
+def test_evidence_is_rounded_and_the_margin_of_the_row_time_is_told_in_words():
+    words = told(STANDARD, 25.0)
+    exact = outlook(STANDARD, 25.0).evidence
+    rounded = re.search(r"evidence about ([0-9,]+), where 25 confirm", words)
+    assert rounded
+    assert float(rounded[1].replace(",", "")) == pytest.approx(exact, rel=0.05)
+    assert len(rounded[1].replace(",", "").rstrip("0")) <= 2
+    assert "38 % shorter to 150 % longer than the true" in words
+    assert "50 % shorter or longer by any amount than the true" in told(STANDARD, 15.0)
+    assert "any" not in told(STANDARD, 25.0).replace("many", "")
+
+
+def test_what_tells_aliases_apart_without_row_times_is_the_offset_or_nothing():
+    assert "the offset between the cameras" in told(Setup(readout_s=0.0, offset_s=0.010), 25.0)
+    words = told(Setup(readout_s=0.0, offset_s=0.0), 25.0)
+    assert "what tells these apart         nothing: all rows are seen at once" in words
+    assert "0.000 px" not in words

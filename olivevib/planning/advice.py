@@ -9,6 +9,7 @@ from olivevib.planning.setup import APART, Setup
 
 LEAST_MARKER_MM = 50.0
 REST_S = 2.0
+NEARLY_HALF, NEARLY_STEP = 0.45, 0.05  # shares of a frame period
 
 
 def advice(setup: Setup, found: Outlook) -> tuple[str, ...]:
@@ -65,15 +66,23 @@ def _rows(setup: Setup, found: Outlook) -> list[str]:
 
 
 def _offset(setup: Setup) -> list[str]:
-    low, high = (1e3 * share / setup.fps for share in APART)
     if setup.apart:
         return []
-    share = setup.period_share
-    if share is not None and share > 0.45:
-        twin = "half a frame apart ties each frequency to its mirror"
+    share, low = setup.period_share, APART[0]
+    lost = "several frequencies are lost to the sway and to their own mirrors"
+    if share is None:
+        why = f"in step, {lost}; how far apart they start is not said (--offset MS)"
+    elif share > NEARLY_HALF:
+        why = "half a frame apart ties each frequency to its mirror"
+    elif share < NEARLY_STEP:
+        why = f"in step, {lost}"
     else:
-        twin = "in step, several frequencies are lost to the sway and to their own mirrors"
-    return [f"Start the cameras {low:.0f}-{high:.0f} ms apart: {twin}."]
+        side = "little" if share < low else "much"
+        why = (
+            f"{1e3 * (setup.offset_s or 0.0):g} ms is {share:.2f} of a frame period, too {side}"
+            " to take away every zone"
+        )
+    return [f"Start the cameras {setup.apart_ms} apart: {why}."]
 
 
 def _always(setup: Setup) -> list[str]:

@@ -175,5 +175,5 @@ def _status(
 def why_alike(setup: Setup) -> str:
     """Why nothing in this setup could tell a frequency from its aliases."""
     if setup.readout_s is None:
-        return "the row time is not known, and the cameras are not 8-13 ms apart"
-    return "all rows are seen at once, and the cameras are not 8-13 ms apart"
+        return f"the row time is not known, and the cameras are not {setup.apart_ms} apart"
+    return f"all rows are seen at once, and the cameras are not {setup.apart_ms} apart"

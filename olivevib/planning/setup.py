@@ -78,6 +78,12 @@ class Setup:
         return share is not None and APART[0] - 1e-9 <= share <= APART[1] + 1e-9
 
     @property
+    def apart_ms(self) -> str:
+        """The offsets that do, in words: "8-13 ms" at 30 frames/s."""
+        low, high = (f"{1e3 * share / self.fps:.2g}" for share in APART)
+        return f"{low}-{high} ms"
+
+    @property
     def in_step(self) -> bool:
         """Whether both cameras look at the same moments, so that only rows can tell."""
         share = self.period_share

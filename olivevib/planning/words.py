@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from olivevib.planning.outlook import BLURRED, SHARP, Outlook
+from olivevib.planning.outlook import BLURRED, SHARP, Outlook, why_alike
 from olivevib.planning.setup import Setup
 from olivevib.planning.zones import Zone, zones
 
@@ -33,22 +33,46 @@ def one_words(setup: Setup, o: Outlook, told: Sequence[str], more: str = "") -> 
         f"  marker in the picture          {setup.marker_px:.1f} px high",
         f"  a plain spectrum shows it at   {o.seen_hz:.2f} Hz "
         f"({o.seen_acceleration_m_s2:.1f} m/s²)",
-        f"  the same to the frames         {', '.join(f'{f:.2f}' for f in o.aliases_hz)} Hz",
-        f"  contrast between aliases       {o.contrast_px:.3f} px, expected evidence "
-        f"{o.evidence:.0f} (25 confirm)",
-        f"  least amplitude to confirm     {_mm(o.least_amplitude_mm)}",
+        *_alias_lines(setup, o),
         f"  expected sigma of amplitude    {o.sigma_plane_mm:.3f} mm across, "
         f"{o.sigma_depth_mm:.3f} mm in depth",
         f"  false depth, frames as pairs   {_mm(o.false_depth_mm)} "
         f"({o.false_depth_per_ms_mm:.2f} mm per ms out of step)",
         f"  frequency x exposure           {o.blur:.3f} ({_blur(o.blur)})",
     ]
-    if not setup.direct and setup.row_time_s > 0:
-        small, large = o.row_time_margin
-        more = "any" if math.isinf(large) else f"{100 * large:.0f} %"
-        lines.append(f"  the row time may be wrong by   -{100 * small:.0f} % or +{more}")
     lines += ["", f"  zones to avoid                 {_zone_words(setup)}", ""]
     return "\n".join([*lines, "For the trial:", *(f"  - {text}" for text in told)])
+
+
+def _alias_lines(setup: Setup, o: Outlook) -> list[str]:
+    """What looks the same to the frames, and what tells it apart."""
+    if setup.direct:
+        return ["  the same to the frames         nothing else in the band: nothing to decide"]
+    lines = [
+        f"  the same to the frames         {', '.join(f'{f:.2f}' for f in o.aliases_hz)} Hz",
+        f"  what tells these apart         {_evidence(setup, o)}",
+        f"  least amplitude to confirm     {_mm(o.least_amplitude_mm)}",
+    ]
+    if setup.row_time_s > 0:
+        small, large = o.row_time_margin
+        longer = (
+            "or longer by any amount" if math.isinf(large) else f"to {100 * large:.0f} % longer"
+        )
+        lines.append(
+            f"  row time that still tells it   {100 * small:.0f} % shorter {longer} than the true"
+        )
+    return lines
+
+
+def _evidence(setup: Setup, o: Outlook) -> str:
+    """By what, and how much of it there is."""
+    if setup.row_time_s > 0:
+        digits = 1 - math.floor(math.log10(o.evidence)) if o.evidence > 0 else 0
+        size = f"{round(o.evidence, digits):,.10g}"
+        return f"{o.contrast_px:.3f} px between them; evidence about {size}, where 25 confirm"
+    if setup.apart:
+        return "the offset between the cameras, from motion across their baseline"
+    return f"nothing: {why_alike(setup)}"
 
 
 def _mm(value: float) -> str:
@@ -86,7 +110,11 @@ def table_words(setup: Setup, found: Sequence[Outlook]) -> str:
         "    Hz seen at  status      least mm sigma mm depth mm false depth   m/s²",
     ]
     for o in found:
-        least = "-" if math.isinf(o.least_amplitude_mm) else f"{o.least_amplitude_mm:.2f}"
+        least = (
+            "-"
+            if setup.direct or math.isinf(o.least_amplitude_mm)
+            else f"{o.least_amplitude_mm:.2f}"
+        )
         false = "-" if math.isnan(o.false_depth_mm) else f"{o.false_depth_mm:.2f}"
         lines.append(
             f"{o.f_hz:6.2f} {o.seen_hz:7.2f}  {o.status:11} {least:>8} {o.sigma_plane_mm:8.3f} "
