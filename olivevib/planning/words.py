@@ -55,12 +55,11 @@ def _alias_lines(setup: Setup, o: Outlook) -> list[str]:
     ]
     if setup.row_time_s > 0:
         small, large = o.row_time_margin
-        longer = (
-            "or longer by any amount" if math.isinf(large) else f"to {100 * large:.0f} % longer"
-        )
-        lines.append(
-            f"  row time that still tells it   {100 * small:.0f} % shorter {longer} than the true"
-        )
+        least = f"{100 * small:.0f} % shorter"
+        told = f"{least} to {100 * large:.0f} % longer than the true one"
+        if math.isinf(large):
+            told = f"{least} than the true one, or longer"
+        lines.append(f"  row time that still tells it   {told}")
     return lines
 
 
