@@ -8,6 +8,7 @@ import pytest
 import tui_scene as scene
 
 from olivevib.cli import main
+from olivevib.trial import Trial
 from olivevib.values import counted
 from olivevib.vibration import LineStatus
 
@@ -56,3 +57,15 @@ def test_the_browser_says_how_it_is_installed(monkeypatch, capsys):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert main(["serve"]) == 2
     assert "pip install textual-serve" in capsys.readouterr().err
+
+
+def test_compare_says_what_came_out(workspace, monkeypatch, capsys):
+    monkeypatch.setattr("olivevib.pipeline.run_stage", lambda *_: ())
+    assert main(["compare", "T04"]) == 0
+    told = capsys.readouterr().err
+    (found,) = Trial.open(workspace / "trials" / "T04").comparison
+    assert f"  {found.sensor} at marker {found.marker}: {found.verdict}" in told
+    assert found.reason in told
+    assert f"gain (camera over sensor) {found.gain:.2f}" in told
+    assert main(["compare", "T05"]) == 0
+    assert "nothing was compared: no accelerometer" in capsys.readouterr().err

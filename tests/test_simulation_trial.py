@@ -27,6 +27,7 @@ from olivevib.simulation import (
 )
 from olivevib.simulation.recording import jpeg
 from olivevib.simulation.scenarios import BoardPlan, CameraPlan, Scenario
+from olivevib.simulation.trial_writer import _in_us
 from olivevib.simulation.truth import covered
 
 SMALL = CameraPlan(size_px=(640, 360), focal_px=475.0)
@@ -216,6 +217,14 @@ def check_board(made, side):
         true = camera.project(body.points_mm(0.0, board.points_mm[:, :2])[0])
         assert len(ids) == 24
         assert np.sqrt(((corners.reshape(-1, 2) - true[ids.ravel()]) ** 2).mean()) < 0.1
+
+
+def test_numbers_of_a_trial_are_as_a_person_types_them(tmp_path):
+    assert 20.3e-6 * 1e6 != 20.3  # what a product leaves behind
+    assert _in_us((20.3e-6, -20.3e-6)) == (20.3, -20.3)
+    made = simulate(tmp_path, short(frames=1, views=1), 1)
+    told = [made.size_mm, made.exposure_ms, *(made.row_time_us or ())]
+    assert all(len(str(value)) <= 6 for value in told), told
 
 
 def test_opencv_reads_a_piece_of_the_sample_where_truth_says(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from typing import TYPE_CHECKING
 
 from olivevib import values
@@ -44,8 +45,22 @@ def one(arguments: argparse.Namespace, console: Console) -> int:
         trial = _open(name, changes, console)
         console.say(f"{trial.name}: {arguments.stage}")
         cautions = pipeline.run_stage(trial, arguments.stage, console.tick)
+        if arguments.stage == "compare":
+            _tell_comparison(trial.reopen(), console)
         warned += console.cautions(cautions)
     return 3 if warned else 0
+
+
+def _tell_comparison(trial: Trial, console: Console) -> None:
+    """What came out for each sensor: verdict, reason and gain."""
+    for c in trial.comparison:
+        gain = ""
+        if math.isfinite(c.gain):
+            gain = f"; gain (camera over sensor) {values.with_sigma(c.gain, c.gain_sigma, 4)}"
+        console.say(f"  {c.sensor} at marker {c.marker}: {c.verdict}{gain}")
+        console.say(f"    {c.reason}")
+    if not trial.comparison:
+        console.say("  nothing was compared: no accelerometer is bound to a marker in trial.toml")
 
 
 def _on_cameras(arguments: argparse.Namespace) -> bool:

@@ -197,15 +197,21 @@ def _told(
         board=stage.board.spec,
         markers=scenario.markers.library,
         ids=scenario.markers.ids,
-        size_mm=float(np.median(list(sizes.values()))),
+        size_mm=round(float(np.median(list(sizes.values()))), 3),
         sizes_mm=sizes,
         places={m.id: m.place for m in stage.markers},
         shutter="rolling" if any(rows) else "global",
-        row_time_us=(rows[0] * 1e6, rows[1] * 1e6) if any(rows) and told else None,
-        exposure_ms=scenario.cameras.optics.exposure_s * 1e3,
+        row_time_us=_in_us(rows) if any(rows) and told else None,
+        exposure_ms=round(scenario.cameras.optics.exposure_s * 1e3, 9),
         band_hz=scenario.band_hz,
         accelerometer=accelerometer,
         accelerometer_marker=None if sensor is None else sensor.marker,
         truth=folder / "truth",
         stage=stage,
     )
+
+
+def _in_us(rows_s: tuple[float, float]) -> tuple[float, float]:
+    """Row times as a person writes them: without the last digits of a product."""
+    left, right = rows_s
+    return round(left * 1e6, 9), round(right * 1e6, 9)
