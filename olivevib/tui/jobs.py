@@ -112,7 +112,9 @@ def make_export(folder: Path, to: str, ids: tuple[int, ...] | None = None) -> Wo
         target = pipeline.export_place(trial, to)
         tick(0, 1, f"writing {to}")
         cautions = pipeline.export(trial, to, target, ids)
-        return Result(f"The export is {harmless(target)}", tuple(cautions))
+        words = pipeline.export_words(trial, to, ids)
+        told = f". {to}: {words}" if words else ""
+        return Result(f"The export is {harmless(target)}{told}", tuple(cautions))
 
     return Work(f"{_name(folder)}: export {to}", do)
 
