@@ -109,8 +109,9 @@ def test_same_content_gives_same_bytes(ambiguous):
 
 def test_a_frequency_never_stands_without_its_status(direct):
     text = Reader(direct).visible
-    for found in re.finditer(r"12\.0030[ \u00a0]±[ \u00a0]0\.0016[ \u00a0]Hz", text):
-        assert "direct" in text[found.end() : found.end() + 12]
+    found = list(re.finditer(r"12\.0030[ \u00a0]±[ \u00a0]0\.0017[ \u00a0]Hz", text))
+    assert found
+    assert all("direct" in text[one.end() : one.end() + 12] for one in found)
 
 
 def test_an_ambiguous_line_shows_candidates_and_what_each_would_mean(ambiguous):

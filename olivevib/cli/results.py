@@ -6,12 +6,15 @@ import argparse
 import json
 import sys
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from olivevib import values
 from olivevib.cli.console import Console
 from olivevib.errors import OlivevibError
 from olivevib.values import counted
+
+if TYPE_CHECKING:
+    from olivevib.trial import Trial
 
 
 def show(arguments: argparse.Namespace, console: Console) -> int:
@@ -82,7 +85,17 @@ def report(arguments: argparse.Namespace, console: Console) -> int:
     if hidden and (len(trials) > 1 or not pages):
         told = f"archived, not in the season: {', '.join(hidden)}"
         console.say(f"{told}  (--archived takes them in)")
-    return 0
+    return 3 if sum(_told_first(trial, console, len(trials) > 1) for trial in trials) else 0
+
+
+def _told_first(trial: Trial, console: Console, named: bool) -> int:
+    """Say what failed in a trial and which of its numbers are old; returns how much that is."""
+    from olivevib.trial.standing import standing
+
+    found = standing(trial)
+    if found and named:
+        console.say(f"{trial.name}:")
+    return console.cautions(found)
 
 
 def export(arguments: argparse.Namespace, console: Console) -> int:

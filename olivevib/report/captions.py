@@ -37,9 +37,11 @@ TRUE = (
     " that changes slowly, because that is how it was fitted."
 )
 RATIOS = (
-    "How much of the reference marker's motion arrives at each marker: ratio of the amplitudes of"
-    " the dominant line in the same phase. Diamond: all axes together with one standard deviation;"
-    " open symbols: single axes. Holds whatever the true frequency is."
+    "How much of the motion of the reference, marker {reference}, arrives at each marker: ratio of"
+    " the amplitudes of the dominant line in the same phase. (The reference is the marker of"
+    " vibration.reference in trial.toml, else the first whose place is the trunk, else the first of"
+    " all.) Diamond: all axes together with one standard deviation; open symbols: single axes."
+    " Holds whatever the true frequency is."
 )
 DECAY = (
     "Free decay of the markers that begin largest, along their axis of largest motion. Dots: single"
@@ -53,7 +55,7 @@ SIGMA_MAP = (
 )
 DISTANCES = (
     "Distances between markers. On one rigid body they should not change: what remains there is"
-    " the error of the whole chain. Left: standard deviation of every pair, larger squares vary"
+    " the error of the whole chain. Left: standard deviation of every pair, darker squares vary"
     " more. Right: the steadiest and the least steady pairs and some between."
 )
 FREQUENCY = (
@@ -86,6 +88,11 @@ PSD = (
     " dominant line."
 )
 SEEN = "State of every sample: full height means located; the thinner, the less is known."
+OUTSIDE = (
+    " In 3-D, before {start} s and after {end} s all is flagged: there the fitted motion does not"
+    " hold, because the machine starts, stops or stands; positions are those of single frames and"
+    " enter no figure of the steady phase."
+)
 SIGMA = (
     "How well one position is known: median (symbol) and the middle 90 % of the frames (bar)."
     " Depth (z) is weaker than x and y by about the distance over the baseline."

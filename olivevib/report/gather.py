@@ -18,6 +18,7 @@ from olivevib.report.figures.agreement import CommonLine
 from olivevib.report.season import SeasonEntry
 from olivevib.report.season_table import trial_rows
 from olivevib.trial.stages import STAGES
+from olivevib.trial.standing import standing
 from olivevib.trial.summary import summary
 from olivevib.vibration import SamplingFacts
 from olivevib.vibration.verdict import SWAY_HZ
@@ -49,7 +50,7 @@ def content_of(trial: Trial) -> ReportContent:
         comparisons=trial.comparison,
         cautions=tuple(
             Caution(c.code, within(trial.folder, c.text), within(trial.folder, c.remedy))
-            for c in trial.cautions
+            for c in (*standing(trial), *trial.cautions)
         ),
         sway_hz=SamplingFacts(2 * SWAY_HZ, band_hz=band).sway_hz if band else SWAY_HZ,
         next_time=() if fit is None else fit.next_time,

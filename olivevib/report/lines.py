@@ -46,7 +46,10 @@ def folded_hz(f_hz: float, half_rate_hz: float) -> float:
 
 
 def describe(line: Line) -> str:
-    """A line in a few words: ``12.003 ± 0.002 Hz (direct)``, or what stands against one."""
+    """A line in a few words: ``12.003 ± 0.002 Hz (direct)``, or what stands against one.
+
+    ±: of the fit and of the camera's own clock together.
+    """
     if line.status is LineStatus.NONE:
         return MEANING[line.status]
     if line.status is LineStatus.BLIND:
@@ -57,4 +60,5 @@ def describe(line: Line) -> str:
         return f"{line.status}: {candidates_text(line.candidates_hz or (line.f_hz,))}"
     if not np.isfinite(line.f_hz):
         return str(line.status)
-    return f"{measure(line.f_hz, 'Hz', line.f_sigma_hz)} ({line.status})"
+    sigma = float(np.hypot(line.f_sigma_hz, line.f_clock_sigma_hz))
+    return f"{measure(line.f_hz, 'Hz', sigma)} ({line.status})"

@@ -19,6 +19,7 @@ from olivevib.report.lines import MEANING
 from olivevib.report.plates import Plate, plates
 from olivevib.report.verdict import verdict
 from olivevib.signals import State
+from olivevib.vibration import LineStatus
 from olivevib.vibration.types import CRYSTAL
 
 
@@ -32,6 +33,7 @@ class Section:
 
 
 LONG = 1500  # characters of a verdict or a reason
+SURE = {LineStatus.DIRECT, LineStatus.CONFIRMED}  # a line can be no surer
 MOST_DROPPED = 20  # dropped calibration views that are named
 MOST_PAIRS = 66  # distances listed as a table: 12 markers
 _WANTING = {  # of a section whose stage is done
@@ -108,6 +110,7 @@ def page_facts(content: ReportContent, tick: Tick = silent) -> dict[str, Any]:
         "clock_ppm": f"{1e6 * CRYSTAL:.0f}",
         "meanings": [(str(s), words) for s, words in MEANING.items() if s in statuses],
         "reasons": _reasons(content),
+        "next_time": [] if statuses <= SURE else [clean(a, LONG) for a in content.next_time],
         "record": tables.record_sections(content),
         "rig": tables.rig_pairs(content),
         "cameras": tables.camera_columns(content),
@@ -139,13 +142,13 @@ def page_facts(content: ReportContent, tick: Tick = silent) -> dict[str, Any]:
 
 
 def _comparisons(content: ReportContent) -> list[tuple[Any, ...]]:
-    """Of each sensor: verdict, reason, its numbers, its lines."""
+    """Of each sensor: verdict, reason, its numbers, its lines, what of them is left out."""
     return [
         (
             str(c.verdict),
             clean(c.reason, LONG),
             tables.comparison_pairs(content, c),
-            tables.comparison_lines(c),
+            *tables.comparison_lines(content, c),
         )
         for c in content.comparisons
     ]
@@ -191,10 +194,13 @@ def _distances(content: ReportContent) -> list[tuple[str, str, str]]:
 
 
 def _reasons(content: ReportContent) -> list[tuple[str, str]]:
-    """Why lines have their status: each reason once, with the markers that it holds for."""
+    """Why lines have their status: each reason once, with the markers that it holds for.
+
+    Advice for another time is no reason; it stands apart, and only where it would change something.
+    """
     found: dict[str, list[str]] = defaultdict(list)
     for marker_id, line in content.lines().items():
-        for reason in line.reasons:
+        for reason in (r for r in line.reasons if r not in content.next_time):
             found[clean(reason, LONG).rstrip(".")].append(str(marker_id))
     every = len(content.lines())
     word = {1: "Marker"}

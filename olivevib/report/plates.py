@@ -14,7 +14,7 @@ from olivevib.report.content import ReportContent
 from olivevib.report.lines import KNOWN, OPEN
 from olivevib.report.plates_together import Job, body_jobs, response_jobs
 from olivevib.report.words import number
-from olivevib.vibration import Spectrum
+from olivevib.vibration import Spectrum, largest
 
 ROWS = 8  # markers in one figure
 CLOSE_S = 1.0  # length of the close-up
@@ -115,13 +115,13 @@ def _close(content: ReportContent, ids: Sequence[int]) -> tuple[figures.Window |
 
 
 def ranked(content: ReportContent, ids: Sequence[int]) -> list[int]:
-    """The markers in order of their dominant line, the largest first; unknown ones by id last."""
+    """The markers by the largest amplitude of their line in any direction; unknown ones last."""
     lines = content.lines()
 
     def size(marker_id: int) -> float:
         line = lines.get(marker_id)
-        total = 0.0 if line is None else float(np.sum(line.amplitude**2))
-        return total if np.isfinite(total) else 0.0
+        reach = 0.0 if line is None else largest(line)[0]
+        return reach if np.isfinite(reach) else 0.0
 
     return sorted(ids, key=lambda i: -size(i))
 
@@ -168,7 +168,7 @@ def _spectra(content: ReportContent) -> Iterator[Job]:
     ratios = content.transmissibility
     if ratios is not None:
         job = _bound(figures.transmissibilities, ratios.ratios, names, ratios.reference)
-        yield ("transmissibility", captions.RATIOS, job)
+        yield ("transmissibility", captions.RATIOS.format(reference=ratios.reference), job)
     yield from response_jobs(content)
     if content.decays:
         yield ("decay", captions.DECAY, _bound(figures.decays, content.decays, names))
@@ -212,6 +212,14 @@ def _end_words(content: ReportContent) -> str:
     return f"axis up to {end}"
 
 
+def _outside(content: ReportContent) -> str:
+    """Why positions before and after a fitted motion are flagged; empty where none was fitted."""
+    shown = content.shown_path
+    if shown is None or shown is content.trajectory:
+        return ""
+    return captions.OUTSIDE.format(start=f"{shown.t_s[0]:.2f}", end=f"{shown.t_s[-1]:.2f}")
+
+
 def _quality(content: ReportContent) -> Iterator[Job]:
     path, names, view, rig = (
         content.trajectory, content.names(), content.calibration, content.rig,
@@ -219,7 +227,7 @@ def _quality(content: ReportContent) -> Iterator[Job]:
     rows = figures.strips(content.tracks, path, names)
     for part in range(0, len(rows), STRIPS):
         job = _bound(figures.visibility, rows[part : part + STRIPS], part)
-        yield ("seen", captions.SEEN, job)
+        yield ("seen", captions.SEEN + _outside(content), job)
     if path is not None and np.isfinite(path.sigma_xyz_mm).any():
         yield ("sigma", captions.SIGMA, lambda: figures.sigmas(path, names))
         where = figures.sigma_map(rig, path) if rig is not None else None

@@ -9,9 +9,11 @@ from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
 from olivevib.report.lines import KNOWN, MEANING, MOST, OPEN, candidates_text, describe
 from olivevib.report.tables import candidate_accelerations
-from olivevib.report.words import count, measure, number, percent, triple
+from olivevib.report.words import count, listed, measure, number, percent, triple
+from olivevib.vibration import largest
 from olivevib.vibration.types import Line, LineStatus
 
+LARGEST = "peak, along the long axis of its orbit"
 AXES = "x\u00a0/\u00a0y\u00a0/\u00a0z"
 _REASON = {
     LineStatus.BLIND: "the line looks like slow sway at this frame rate",
@@ -42,19 +44,21 @@ def _trouble(content: ReportContent) -> str:
     if unread:
         parts.append(f"{count(unread, 'file')} of this trial cannot be read and is left out below")
     stages = content.summary.get("stages") or {}
-    for state, words in _STATES.items():
+    for state, (one, several) in _STATES.items():
         found = [name for name, told in stages.items() if (told or {}).get("state") == state]
         if found:
-            reason = clean((stages[found[0]] or {}).get("reason") or "", 300)
-            parts.append(f"{' and '.join(found)} {words}" + (f" ({reason})" if reason else ""))
+            reason = clean((stages[found[0]] or {}).get("reason") or "", 300).rstrip(".")
+            words = f"{listed(found)} {one if len(found) == 1 else several}"
+            parts.append(words + (f" ({reason})" if reason else ""))
     return f"Mind this first: {'; '.join(parts)}." if parts else ""
 
 
-_STATES = {
-    "failed": "failed",
-    "blocked": "could not run",
-    "stale": "is not up to date: what is shown was made from other files or settings",
-    "missing": "has not run",
+_MADE = "up to date: what is shown was made from other files or settings"
+_STATES = {  # of one stage, of several
+    "failed": ("failed", "failed"),
+    "blocked": ("could not run", "could not run"),
+    "stale": (f"is not {_MADE}", f"are not {_MADE}"),
+    "missing": ("has not run", "have not run"),
 }
 
 
@@ -63,7 +67,9 @@ def _seen(content: ReportContent) -> str:
     if path is None or not path.seen.any():
         return "No marker has been located in space yet."
     found = path.seen.any(axis=0)
-    shares = path.seen[:, found].mean(axis=0)
+    told = {m["id"]: m["seen_fraction"] for m in content.summary.get("markers") or []}
+    each = zip(path.ids[found].tolist(), path.seen[:, found].mean(axis=0), strict=True)
+    shares = np.array([told.get(i, share) for i, share in each])
     sigma = np.nanmedian(path.sigma_xyz_mm[path.seen], axis=0)
     known = triple(sigma, "mm")
     span = measure(path.t_s[-1] - path.t_s[0], "s", digits=3)
@@ -83,7 +89,7 @@ def _seen(content: ReportContent) -> str:
 
 
 def strongest(content: ReportContent) -> tuple[int, Line] | None:
-    """The marker whose line is largest, and that line."""
+    """The marker whose line has the largest amplitude in any direction, and that line."""
     lines = {
         i: line
         for i, line in content.lines().items()
@@ -91,7 +97,7 @@ def strongest(content: ReportContent) -> tuple[int, Line] | None:
     }
     if not lines:
         return None
-    best = max(lines, key=lambda i: float(np.sum(lines[i].amplitude ** 2)))
+    best = max(lines, key=lambda i: largest(lines[i])[0])
     return best, lines[best]
 
 
@@ -103,9 +109,7 @@ def _vibration(content: ReportContent) -> str:
         return _without_amplitude(content)
     marker_id, line = found
     name = content.marker_name(marker_id)
-    axis = int(np.argmax(line.amplitude))
-    size = measure(line.amplitude[axis], "mm", line.amplitude_sigma[axis])
-    moves = f"by {size} (peak) along {'xyz'[axis]}"
+    moves = f"by {measure(largest(line)[0], 'mm', largest(line)[1])} ({LARGEST})"
     if line.status in OPEN and line.candidates_hz:
         either = candidates_text(line.candidates_hz, line.probabilities)
         rms = candidate_accelerations(content, marker_id)[:MOST]
@@ -152,7 +156,9 @@ def _trust(content: ReportContent) -> str:
         parts.append("there is no accelerometer to compare with")
     else:
         verdicts = dict.fromkeys(c.verdict for c in content.comparisons)
-        parts.append(", ".join(_AGREEMENT[v] for v in verdicts))
+        old = ((content.summary.get("stages") or {}).get("compare") or {}).get("old")
+        but = f", but these numbers {clean(old, 300)}" if old else ""
+        parts.append(", ".join(_AGREEMENT[v] for v in verdicts) + but)
     n = len(content.cautions)
     if n:
         parts.append(f"{count(n, 'warning')} to read below")

@@ -11,32 +11,43 @@ import numpy as np
 
 from olivevib.comparison import Comparison
 from olivevib.errors import Caution
+from olivevib.reconstruction import Trajectory
 from olivevib.reconstruction.continuous import decided
+from olivevib.signals import State
+from olivevib.trial.records.tracks import StoredTracks
+from olivevib.trial.stages import StageState
+from olivevib.trial.standing import old_results, standing
 from olivevib.trial.survey_summary import known, sensor_summary, vibration_summary
-from olivevib.vibration import LineStatus, MarkerMotion
+from olivevib.vibration import LineStatus, MarkerMotion, largest
 
 if TYPE_CHECKING:
     from olivevib.trial.trial import Trial
 
+SURE = (LineStatus.DIRECT, LineStatus.CONFIRMED)
 KNOWN = (LineStatus.DIRECT, LineStatus.CONFIRMED, LineStatus.SUPPORTED)
 
 
 def summary(trial: Trial) -> dict[str, Any]:
     """The whole summary as plain values (str, float, int, list, dict, None)."""
+    states = trial.states()
+    old = old_results(trial, states)
     return {
         "trial": trial.name,
         "simulated": trial.settings.session.simulated,
-        "stages": {
-            name: {"state": s.state.value, "reason": s.reason} for name, s in trial.states().items()
-        },
+        "stages": {name: _stage(s, old.get(name)) for name, s in states.items()},
         "calibration": _calibration(trial),
         "timing": _timing(trial),
         "markers": _markers(trial),
-        "vibration": vibration_summary(trial.vibration),
+        "vibration": vibration_summary(trial.vibration, trial.trajectory),
         "comparison": _comparison(trial.comparison),
         "comparisons": [sensor_summary(c) for c in trial.comparison],
-        "warnings": [_caution(c) for c in trial.cautions],
+        "warnings": [_caution(c) for c in (*standing(trial), *trial.cautions)],
     }
+
+
+def _stage(state: StageState, old: str | None) -> dict[str, str | None]:
+    """State and reason; ``old``: why what is stored is not of the trial as it is now."""
+    return {"state": state.state.value, "reason": state.reason, "old": old}
 
 
 def _caution(caution: Caution) -> dict[str, str]:
@@ -101,20 +112,45 @@ def _markers(trial: Trial) -> list[dict[str, Any]]:
     trajectory = trial.trajectory
     if trajectory is None:
         return []
-    seen = trajectory.seen
+    fit = trial.reconstruction.motion if trial.reconstruction else None
+    advice = () if fit is None else fit.next_time
+    seen = seen_fractions(trajectory, trial.tracks)
     return [
         {
             "id": int(i),
             "place": trial.settings.markers.place_of(int(i)),
-            "seen_fraction": float(seen[:, k].mean()) if len(seen) else 0.0,
+            "seen_fraction": seen[int(i)],
         }
-        | _motion(trial.vibration.row(int(i)) if trial.vibration else None)
-        for k, i in enumerate(trajectory.ids)
+        | _motion(trial.vibration.row(int(i)) if trial.vibration else None, advice)
+        for i in trajectory.ids
     ]
 
 
-def _motion(row: MarkerMotion | None) -> dict[str, Any]:
-    """Line and figures of one marker; a frequency only where it is known."""
+def seen_fractions(path: Trajectory, tracks: StoredTracks | None) -> dict[int, float]:
+    """Of each marker the share of the frames in which both cameras saw it.
+
+    Of a path at the frames' own times these are its instants; a fitted one has finer instants, so
+    there the tracks of the two cameras tell.
+    """
+    shares = path.seen.mean(axis=0) if len(path.seen) else np.zeros(path.ids.size)
+    out = {int(i): float(share) for i, share in zip(path.ids, shares, strict=True)}
+    if path.method == "continuous" and tracks is not None:
+        right = {t.id: t.state <= State.FLAGGED for t in tracks.right}
+        for track in tracks.left:
+            if track.id in right and track.id in out:
+                left, other = track.state <= State.FLAGGED, right[track.id]
+                both = min(left.size, other.size)
+                seen = np.count_nonzero(left[:both] & other[:both])
+                out[track.id] = float(seen / max(1, left.size))
+    return out
+
+
+def _motion(row: MarkerMotion | None, advice: tuple[str, ...]) -> dict[str, Any]:
+    """Line and figures of one marker; a frequency only where it is known.
+
+    advice: what would make the frequency surer another time; it is no reason for a status, and
+    where the status could be no surer it would change nothing.
+    """
     if row is None:
         unknown = dict.fromkeys("xyz")
         return {
@@ -125,14 +161,18 @@ def _motion(row: MarkerMotion | None) -> dict[str, Any]:
             "frequency_candidates_hz": [],
             "frequency_probabilities": [],
             "frequency_reasons": [],
+            "frequency_next_time": [],
             "amplitude_mm": unknown,
             "amplitude_sigma_mm": unknown,
+            "amplitude_largest_mm": None,
+            "amplitude_largest_sigma_mm": None,
             "acceleration_rms_m_s2": None,
             "frequency_clock_sigma_hz": None,
             "displacement_pp_mm": None,
             "displacement_pp_sigma_mm": None,
         }
     line, decided = row.line, row.line.status in KNOWN
+    size, size_sigma = largest(line)
     proven = bool(np.isfinite(line.amplitude_sigma).any())  # else the motion itself is in doubt
     return {
         "phase": row.phase,
@@ -142,9 +182,12 @@ def _motion(row: MarkerMotion | None) -> dict[str, Any]:
         "frequency_status": line.status.value,
         "frequency_candidates_hz": [float(f) for f in line.candidates_hz],
         "frequency_probabilities": [float(p) for p in line.probabilities],
-        "frequency_reasons": list(line.reasons),
+        "frequency_reasons": [r for r in line.reasons if r not in advice],
+        "frequency_next_time": [] if line.status in SURE else list(advice),
         "amplitude_mm": _axes(line.amplitude),
         "amplitude_sigma_mm": _axes(line.amplitude_sigma),
+        "amplitude_largest_mm": known(size),
+        "amplitude_largest_sigma_mm": known(size_sigma),
         "acceleration_rms_m_s2": known(row.acceleration_rms_m_s2),
         "displacement_pp_mm": known(row.displacement_pp_mm),
         "displacement_pp_sigma_mm": known(row.displacement_pp_sigma_mm) if proven else None,

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from olivevib.arrays import Floats
 from olivevib.comparison import Comparison
+from olivevib.reconstruction import Trajectory
 from olivevib.vibration import (
     Figures,
     MarkerMotion,
@@ -31,20 +33,41 @@ def known(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else float(value)
 
 
-def vibration_summary(result: Vibration | None) -> dict[str, Any] | None:
-    """Phases, figures of every marker and phase, and the survey; None before analyse."""
+def vibration_summary(
+    result: Vibration | None, path: Trajectory | None = None
+) -> dict[str, Any] | None:
+    """Phases, figures of every marker and phase, and the survey; None before analyse.
+
+    path: the positions that were analysed. Where they are those of a fitted motion, what a line
+    leaves of the curve is no noise of a measurement: the sigma of its positions stands there.
+    """
     if result is None:
         return None
+    rows = [_row(row) for row in result.table]
+    if path is not None and path.method == "continuous":
+        for row in rows:
+            row["displacement_mm"]["noise"] = axes(_position_sigma(path, row))
+            for name in ("velocity_mm_s", "acceleration_m_s2"):
+                row[name]["noise"] = axes([None] * 3)
     return {
         "phases": [{"name": p.name, "start_s": p.start_s, "end_s": p.end_s} for p in result.phases],
-        "figures": [_row(row) for row in result.table],
+        "figures": rows,
         "survey": None if result.survey is None else _survey(result.survey),
     }
 
 
+def _position_sigma(path: Trajectory, row: dict[str, Any]) -> Floats:
+    """(3,) rms of the sigma of one marker's positions in the phase of a row, mm."""
+    m = int(np.flatnonzero(path.ids == row["id"])[0])
+    inside = (path.t_s >= row["start_s"]) & (path.t_s <= row["end_s"]) & path.seen[:, m]
+    if not inside.any():
+        return np.full(3, np.nan)
+    return np.asarray(np.sqrt(np.mean(path.sigma_xyz_mm[inside, m] ** 2, axis=0)))
+
+
 def axes(values: Any) -> dict[str, float | None]:
     """Three values by axis."""
-    return dict(zip("xyz", (known(float(v)) for v in values), strict=True))
+    return dict(zip("xyz", (None if v is None else known(float(v)) for v in values), strict=True))
 
 
 def _row(row: MarkerMotion) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from olivevib.vibration.kinematics import to_displacement
 from olivevib.vibration.line import LineSettings, dominant_line
 from olivevib.vibration.modal import Decay, fit_decay
 from olivevib.vibration.motion import CandidateMotion, MarkerMotion
-from olivevib.vibration.orbit import Orbit, Precession, orbit, precession
+from olivevib.vibration.orbit import Orbit, Precession, largest, orbit, precession
 from olivevib.vibration.phases import Phase, PhaseSettings, find_phases, find_sensor_phases
 from olivevib.vibration.response import MarkerResponse, marker_response
 from olivevib.vibration.result import Vibration
@@ -69,6 +69,7 @@ __all__ = [
     "find_sensor_phases",
     "fit_decay",
     "frequency_response",
+    "largest",
     "line_ratio",
     "marker_response",
     "orbit",

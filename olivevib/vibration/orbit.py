@@ -77,6 +77,15 @@ def orbit(line: Line) -> Orbit:
     )
 
 
+def largest(line: Line) -> tuple[float, float]:
+    """The largest amplitude of a line in any direction, and its sigma: the long half axis.
+
+    The sigma is that of axes that err alike (an exposure that is corrected), an upper bound.
+    """
+    found = orbit(line)
+    return found.major, float(np.abs(found.major_axis) @ line.amplitude_sigma)
+
+
 def _noise_across(line: Line, major_axis: Floats) -> float:
     """Sigma of an amplitude across the long axis, rms of the two directions."""
     size = float(np.linalg.norm(major_axis))

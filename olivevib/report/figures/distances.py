@@ -104,8 +104,7 @@ def _map(ax: Axes, pairs: Sequence[Distance], ids: Sequence[int]) -> None:
     small = len(ids) > 12
     for pair in pairs:
         x, y = at[pair.first], at[pair.second]
-        side = 0.15 + 0.8 * np.sqrt(pair.sd_mm / largest)
-        ax.add_patch(_square(x, y, side))
+        ax.add_patch(_square(x, y, pair.sd_mm / largest))
         if not small:
             ax.text(x, y, f"{pair.sd_mm:.2g}", ha="center", va="center",
                     fontsize=6.5 if len(ids) <= 8 else 5)  # fmt: skip
@@ -120,6 +119,7 @@ def _map(ax: Axes, pairs: Sequence[Distance], ids: Sequence[int]) -> None:
         spine.set_visible(False)
 
 
-def _square(x: float, y: float, side: float) -> Rectangle:
-    place = (x - side / 2, y - side / 2)
-    return Rectangle(place, side, side, facecolor=canvas.GRID, edgecolor=canvas.SECOND, lw=0.5)
+def _square(x: float, y: float, share: float) -> Rectangle:
+    """A square that holds its number, the darker the larger ``share`` (0…1) is."""
+    place = (x - 0.47, y - 0.47)
+    return Rectangle(place, 0.94, 0.94, facecolor=canvas.SECOND, alpha=0.06 + 0.6 * share, lw=0)

@@ -18,13 +18,25 @@ def comparison_pairs(content: ReportContent, c: Comparison) -> list[Pair]:
         ("marker and sensor", f"{content.marker_name(c.marker)}; {clean(c.sensor, 80)}"),
         ("sensor's stamp less the trial clock", seconds(c.clock_offset_s, c.clock_offset_sigma_s)),
         ("drift of the sensor's clock", measure(c.clock_drift_ppm, "ppm", c.clock_drift_sigma_ppm)),
-        ("gain, camera / sensor", measure(c.gain, "", c.gain_sigma)),
+        ("gain, camera / sensor", _gain(c)),
         ("rotation, sensor to camera axes", measure(c.rotation_deg, "°", c.rotation_sigma_deg)),
-        ("share of the motion that both see", measure(c.coherence, "", digits=4)),
-        ("correlation, and at the best rival lag", f"{_r(c.peak)}; {_r(c.second_peak)}"),
+        ("correlation of what both see", _r(float(np.sqrt(c.coherence)))),
+        ("share of the motion that both see (its square)", _r(c.coherence)),
+        (
+            "likeness in the first search: best lag; best rival",
+            f"{_r(c.peak)}; {_r(c.second_peak)}",
+        ),
         *_limits(c),
         *_rival(c),
     ]
+
+
+def _gain(c: Comparison) -> str:
+    """The gain, and by how many per cent it is off one, as the verdict says it."""
+    if not np.isfinite(c.gain):
+        return NOT_KNOWN
+    off = measure(100 * (c.gain - 1), "%", 100 * c.gain_sigma)
+    return f"{measure(c.gain, '', c.gain_sigma)} ({off})"
 
 
 def _limits(c: Comparison) -> list[Pair]:
@@ -47,10 +59,20 @@ def _r(value: float) -> str:
     return number(value, 4) if np.isfinite(value) else NOT_KNOWN
 
 
-def comparison_lines(comparison: Comparison) -> list[tuple[str, str, str, str, str]]:
-    """Each common line: frequency, camera, sensor, their difference, phase."""
-    out = []
+def comparison_lines(
+    content: ReportContent, comparison: Comparison
+) -> tuple[list[tuple[str, str, str, str, str]], str]:
+    """Each line that both may see: frequency, camera, sensor, difference, phase; and what is left.
+
+    A path that was fitted holds one line and its harmonics. Of others it says nothing: those are
+    left out of the rows and named in words.
+    """
+    out, left = [], []
     for each in comparison.lines:
+        if not _held(content, comparison, each.f_hz):
+            size = measure(each.sensor_m_s2, "m/s2", each.sensor_sigma_m_s2)
+            left.append(f"{number(each.f_hz, 4)}\u00a0Hz ({size})")
+            continue
         sigma = float(np.hypot(each.optical_sigma_m_s2, each.sensor_sigma_m_s2))
         out.append((
             measure(each.f_hz, "Hz"),
@@ -59,4 +81,21 @@ def comparison_lines(comparison: Comparison) -> list[tuple[str, str, str, str, s
             measure(each.optical_m_s2 - each.sensor_m_s2, "m/s2", sigma),
             measure(each.phase_deg, "°", each.phase_sigma_deg),
         ))  # fmt: skip
-    return out
+    words = _LEFT.format(lines="; ".join(left)) if left else ""
+    return out, words
+
+
+_LEFT = (
+    "Left out, as the sensor sees them: {lines}. The camera's path was fitted at one frequency with"
+    " its harmonics, so it holds no other line, however strong: of these the camera says nothing."
+)
+
+
+def _held(content: ReportContent, c: Comparison, f_hz: float) -> bool:
+    """Whether the path that was compared can hold a line of that frequency."""
+    line, spectrum = content.lines().get(c.marker), content.displacement
+    if not content.continuous or line is None or spectrum is None or not np.isfinite(line.f_hz):
+        return True
+    order = round(f_hz / line.f_hz)
+    known = 1 <= order <= 1 + len(line.harmonics)
+    return known and abs(f_hz - order * line.f_hz) < spectrum.resolution_hz

@@ -27,7 +27,7 @@ class MarkerRow:
     frequency: str
     status: str
     candidates: tuple[str, ...]
-    amplitude: tuple[str, str, str]
+    amplitude: tuple[str, str, str, str]  # x, y, z, largest in any direction
     acceleration: tuple[str, ...]
     displacement: str
 
@@ -65,7 +65,8 @@ def marker_rows(content: ReportContent) -> list[MarkerRow]:
         sizes, sigmas = marker.get("amplitude_mm") or {}, marker.get("amplitude_sigma_mm") or {}
         x, y, z = (measure(sizes.get(a), "", sigmas.get(a), digits=3) for a in "xyz")
         listed = marker.get("frequency_candidates_hz") or []
-        hz, sigma = marker.get("frequency_hz"), marker.get("frequency_sigma_hz")
+        hz, sigma = marker.get("frequency_hz"), _both(marker)
+        most = (marker.get("amplitude_largest_mm"), marker.get("amplitude_largest_sigma_mm"))
         rows.append(
             MarkerRow(
                 id=marker_id,
@@ -74,7 +75,7 @@ def marker_rows(content: ReportContent) -> list[MarkerRow]:
                 frequency="" if listed and hz is None else measure(hz, "Hz", sigma),
                 status=clean(marker.get("frequency_status") or NOT_KNOWN),
                 candidates=_candidates(listed, line),
-                amplitude=(x, y, z),
+                amplitude=(x, y, z, measure(most[0], "", most[1], digits=3)),
                 acceleration=_acceleration(content, marker),
                 displacement=measure(
                     marker.get("displacement_pp_mm"),
@@ -85,6 +86,14 @@ def marker_rows(content: ReportContent) -> list[MarkerRow]:
             )
         )
     return rows
+
+
+def _both(marker: Mapping[str, Any]) -> float | None:
+    """Sigma of a frequency, of the fit and of the camera's own clock together."""
+    sigma, clock = marker.get("frequency_sigma_hz"), marker.get("frequency_clock_sigma_hz")
+    if sigma is None or not known(sigma):
+        return None
+    return float(np.hypot(sigma, clock or 0.0))
 
 
 def _candidates(listed: Sequence[float], line: Line | None) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ import numpy as np
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
 from olivevib.report.words import NOT_KNOWN, measure, number, triple
-from olivevib.vibration import Figures
+from olivevib.vibration import Figures, largest
 
 Row = tuple[str, ...]
 
@@ -64,12 +64,13 @@ def orbit_rows(content: ReportContent) -> list[Row]:
         one, line = m.orbit, lines.get(m.id)
         if not np.isfinite(one.major) or line is None:
             continue
+        major, major_sigma = largest(line)
         sigma = float(np.sqrt(np.mean(line.amplitude_sigma**2)))
         minor = "straight" if one.straight else measure(one.minor, "mm", sigma)
         normal = NOT_KNOWN if one.straight or one.folded else _unit(one.normal)
         turning = measure(m.precession_deg_s, "°/s", m.precession_sigma_deg_s)
         out.append((
-            content.marker_name(m.id), measure(one.major, "mm", sigma), minor,
+            content.marker_name(m.id), measure(major, "mm", major_sigma), minor,
             _unit(one.major_axis), normal, turning,
         ))  # fmt: skip
     return out

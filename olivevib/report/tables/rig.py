@@ -10,8 +10,9 @@ import numpy as np
 from olivevib.geometry import CameraModel
 from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
-from olivevib.report.words import NOT_KNOWN, fact, measure, number, seconds
+from olivevib.report.words import NOT_KNOWN, fact, known, measure, number, seconds
 from olivevib.signals import fit_stamps
+from olivevib.vibration.types import CRYSTAL
 
 Pair = tuple[str, str]  # label, value with unit
 
@@ -118,13 +119,19 @@ def _clock(content: ReportContent, side: str) -> list[Pair]:
     return [
         ("recording", clean(get("video") or NOT_KNOWN, 60)),
         ("codec", clean(get("codec") or NOT_KNOWN, 20)),
-        ("frame rate by the stamps", measure(get("rate_hz"), "frames/s", get("rate_sigma_hz"))),
+        ("frame rate by the stamps", _frames_a_second(get("rate_hz"), get("rate_sigma_hz"))),
         ("stamps from", clean(get("stamp_kind") or NOT_KNOWN, 30)),
         ("scatter of the stamps, rms", seconds(get("jitter_s"))),
         ("largest distance from an even clock", seconds(get("worst_s"))),
         ("frames; dropped; damaged", counts),
         *pairs,
     ]
+
+
+def _frames_a_second(rate_hz: Any, sigma_hz: Any) -> str:
+    """A frame rate; its sigma is that of the stamps and of the camera's own clock together."""
+    both = np.hypot(sigma_hz, CRYSTAL * rate_hz) if known(rate_hz) and known(sigma_hz) else None
+    return measure(rate_hz, "frames/s", None if both is None else float(both))
 
 
 def _rate(content: ReportContent) -> list[Pair]:
@@ -136,6 +143,6 @@ def _rate(content: ReportContent) -> list[Pair]:
         return [("instants of the paths", counts)]
     clock = fit_stamps(path.t_s)
     return [
-        ("frame rate on the trial clock", measure(clock.rate_hz, "frames/s", clock.rate_sigma_hz)),
+        ("frame rate on the trial clock", _frames_a_second(clock.rate_hz, clock.rate_sigma_hz)),
         ("frames; missing between them", f"{path.t_s.size}; {clock.dropped.size}"),
     ]
