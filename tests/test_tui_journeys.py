@@ -571,7 +571,7 @@ async def test_a_second_trial_begins_as_the_last_one(workspace):
         names = ("size", "exposure", "operator", "place", "cultivar", "rig", "left")
         form = [app.screen.query_one(f"#{name}", Input).value for name in names]
         assert form == ["72.5", "2.5", "Ana", "Bari, plot 7", "Coratina", "", ""]
-        assert "as in 2026-11-20_T05" in screen_text(app)
+        assert "Taken from 2026-11-20_T05, check it: " in screen_text(app)
 
 
 async def test_the_form_says_in_its_own_words_what_is_wrong(workspace, tmp_path):

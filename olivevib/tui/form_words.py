@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from olivevib.errors import OlivevibError, UsageError
 from olivevib.tui.fields import Field
+from olivevib.tui.harmless import harmless
 from olivevib.tui.plan import FORM_NAMES
 from olivevib.tui.sensors import PARTS, sensor_line, sensor_of
 
@@ -62,3 +63,12 @@ def unsaid_words(unsaid: Sequence[str], fields: Sequence[Field]) -> str:
         names = [labels.get(FORM_NAMES.get(o, o), o) for o in options] or [text.split(":")[0]]
         words.append(f"{names[0]} ({text.split(': ', 1)[1]})")
     return f"Not said yet: {'; '.join(words)}." if words else ""
+
+
+def taken_words(source: str, taken: Sequence[tuple[str, str]]) -> str:
+    """Which lines, (label, value), stand as in another trial; "" for none."""
+    words = []
+    for label, value in taken:
+        name, _, unit = label.partition(", ")
+        words.append(f"{name} {harmless(value, 40)}{' ' * bool(unit)}{unit}")
+    return f"Taken from {source}, check it: {' · '.join(words)}" if words else ""

@@ -17,6 +17,7 @@ from olivevib.tui.loader import TrialRow, trial_folders, trial_row
 from olivevib.tui.screens.edit import EditScreen
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.views.batch import BatchLine, batch_cells, failure_words
+from olivevib.tui.widgets.row_table import RowTable
 
 if TYPE_CHECKING:
     from olivevib.batch import TrialResult
@@ -55,7 +56,7 @@ class BatchPage(Page):
 
     def body(self) -> ComposeResult:
         """The trials, and why the marked one failed."""
-        yield DataTable(id="batch", classes="pane", cursor_type="row")
+        yield RowTable(id="batch")
         yield Static(id="why", markup=False)
 
     def on_mount(self) -> None:

@@ -7,7 +7,6 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import VerticalScroll
 from textual.widgets import Button, Input, Static
 
 from olivevib.errors import OlivevibError
@@ -19,7 +18,7 @@ from olivevib.tui.plan import free_name
 from olivevib.tui.screens.form_page import FormPage
 from olivevib.tui.screens.page import Help, Jump
 from olivevib.tui.views.cameras import cameras_text
-from olivevib.tui.widgets.form import form_rows
+from olivevib.tui.widgets.form import Form, form_rows
 
 
 class CapturePage(FormPage):
@@ -48,7 +47,7 @@ class CapturePage(FormPage):
     def body(self) -> ComposeResult:
         """The cameras that are there, and the form."""
         yield Static("looking for cameras …", id="cameras", classes="pane", markup=False)
-        with VerticalScroll(id="form", classes="pane", can_focus=False) as form:
+        with Form(id="form", classes="pane") as form:
             form.border_title = "Capture"
             yield from form_rows(FIELDS)
             yield Button("Run the cameras", id="run", variant="primary")

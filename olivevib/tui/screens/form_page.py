@@ -1,4 +1,4 @@
-"""A page with a form: Enter goes on, Ctrl+O or the button of a line offers values or files."""
+"""A page with a form: ↑ ↓ Enter go from line to line, Ctrl+O or its button offers values."""
 
 from __future__ import annotations
 
@@ -48,7 +48,9 @@ class FormPage(Page):
 
     def action_pick(self) -> None:
         """Pick the file, or choose the value, of the line with the cursor."""
-        self.pick((self.focused.id or "") if self.focused else "")
+        if self.focused is not None:
+            self.focused.scroll_visible(animate=False)
+            self.pick(self.focused.id or "")
 
     def pick(self, name: str) -> None:
         """Show what is offered for a line of the form."""

@@ -21,7 +21,7 @@ from olivevib.tui.libraries import FIELDS, Shown, asked_for, picture_file, shown
 from olivevib.tui.loader import guarded
 from olivevib.tui.screens.form_page import FormPage
 from olivevib.tui.screens.page import Help, Jump
-from olivevib.tui.widgets.form import form_rows
+from olivevib.tui.widgets.form import Form, form_rows
 
 
 class LibrariesPage(FormPage):
@@ -52,7 +52,7 @@ class LibrariesPage(FormPage):
     def body(self) -> ComposeResult:
         """The form, and what the library is."""
         with Horizontal(id="plan"):
-            with VerticalScroll(id="form", classes="pane", can_focus=False) as form:
+            with Form(id="form", classes="pane") as form:
                 form.border_title = "Library"
                 yield from form_rows(FIELDS)
                 with Horizontal(classes="buttons"):

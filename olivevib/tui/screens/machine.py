@@ -13,6 +13,7 @@ from olivevib.tui.harmless import harmless, plain
 from olivevib.tui.loader import machine_checks
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.views.tables import meaning
+from olivevib.tui.widgets.row_table import RowTable
 
 if TYPE_CHECKING:
     from olivevib.pipeline.machine import Check
@@ -38,7 +39,7 @@ class MachinePage(Page):
 
     def body(self) -> ComposeResult:
         """One table."""
-        yield DataTable(id="checks", classes="pane", cursor_type="row")
+        yield RowTable(id="checks")
         yield Static(id="why", markup=False)
 
     def on_mount(self) -> None:

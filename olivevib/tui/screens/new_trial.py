@@ -9,7 +9,7 @@ from typing import ClassVar
 from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Horizontal, VerticalScroll
+from textual.containers import Horizontal
 from textual.message import Message
 from textual.widgets import Button, Input, Label, Static
 from textual.worker import get_current_worker
@@ -18,7 +18,7 @@ from olivevib.arrays import Grey
 from olivevib.errors import OlivevibError
 from olivevib.tui import jobs
 from olivevib.tui.fields import Field
-from olivevib.tui.form_words import sentence_of
+from olivevib.tui.form_words import sentence_of, taken_words
 from olivevib.tui.frames import first_frame
 from olivevib.tui.harmless import harmless
 from olivevib.tui.loader import FormValues, form_values, guarded
@@ -36,7 +36,7 @@ from olivevib.tui.screens.form_page import FormPage
 from olivevib.tui.screens.page import Help, Jump
 from olivevib.tui.sensors import PARTS, sensor_fields, sensor_line, sensor_of
 from olivevib.tui.views.picture import Window
-from olivevib.tui.widgets.form import form_rows
+from olivevib.tui.widgets.form import Form, form_rows, say_source
 from olivevib.tui.widgets.picture import Picture
 
 SHOWN = ("left", "right")
@@ -49,7 +49,9 @@ class NewTrialPage(FormPage):
     HELP_TEXT = Help(
         "Two recordings, and either two recordings of the calibration board with its description "
         "or the rig of an earlier calibration. Naming the left side fills in what lies beside it; "
-        "what was said of the last trial stands there already. Ctrl+O, or the button beside a "
+        "n takes marker size, ids, board and more from the trial that was written last, N from the "
+        "marked trial, and its calibration with it; each such line says so until you change it, "
+        "and all of them stand below. ↑ ↓ go from line to line; Ctrl+O, or the button beside a "
         "line, picks a file or chooses a value. What is wrong with a line is told below when you "
         "leave it. Everything is checked before anything is made; recordings are copied, never "
         "moved. F2 makes room for one more accelerometer, F3 takes one out again; each is compared "
@@ -92,6 +94,8 @@ class NewTrialPage(FormPage):
         self._filled = False
         self._sensors = 1
         self._used: Mapping[str, tuple[str, ...]] = {}
+        self._source = ""  # the trial that values are taken over from
+        self._taken_over: dict[str, str] = {}
 
     def read(self) -> FormValues:
         """What the trial that was marked shares with the new one; what was said before."""
@@ -102,25 +106,37 @@ class NewTrialPage(FormPage):
         if not isinstance(value, FormValues) or self._filled:
             return
         self._used, self._filled = value.used, True
+        self._source = harmless(value.source, 20)
         for name, text in value.shared.items():
             field = self.query_one(f"#{name}", Input)
-            field.value = field.value or text
-        if value.source:
-            name = harmless(value.source, 40)
-            self.query_one("#form").border_subtitle = f"as in {name} until you change it"
+            if not field.value:
+                field.value = self._taken_over[name] = text
+        self._say_taken()
         self._look()
+
+    @on(Input.Changed)
+    def _say_taken(self) -> None:
+        """Say at each line, and below the form, what still stands as in another trial."""
+        now = {n: t for n, t in self._taken_over.items() if self.values[n] == t}
+        for name in self._taken_over:
+            say_source(self, name, f"from {self._source}" if name in now else "")
+        told = taken_words(
+            self._source, [(f.label, now[f.name]) for f in self.fields if f.name in now]
+        )
+        self.query_one("#taken", Static).update(told)
 
     def body(self) -> ComposeResult:
         """First frames above, the form below."""
         with Horizontal(id="firsts"):
             yield Picture(id="left-first", title="left, first frame")
             yield Picture(id="right-first", title="right, first frame")
-        with VerticalScroll(id="form", classes="pane", can_focus=False) as form:
+        with Form(id="form", classes="pane") as form:
             form.border_title = "New trial"
             yield from form_rows((*BEFORE_SENSORS, *sensor_fields(1)))
             yield from self._sensor_buttons()
             yield from form_rows(AFTER_SENSORS)
             yield Button("Make the trial", id="make", variant="primary")
+        yield Static(id="taken", markup=False)
         yield Static(id="told", markup=False)
 
     def _sensor_buttons(self) -> ComposeResult:

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from textual import on, work
 from textual.app import ComposeResult
-from textual.containers import Horizontal, VerticalScroll
+from textual.containers import Vertical, VerticalScroll
 from textual.message import Message
 from textual.widgets import Input, Static
 from textual.worker import get_current_worker
@@ -19,7 +19,7 @@ from olivevib.tui.loader import guarded
 from olivevib.tui.planned import FIELDS, USUAL, planned_words
 from olivevib.tui.screens.form_page import FormPage
 from olivevib.tui.screens.page import Help, Jump
-from olivevib.tui.widgets.form import form_rows
+from olivevib.tui.widgets.form import Form, form_rows
 
 
 class PlanningPage(FormPage):
@@ -46,8 +46,8 @@ class PlanningPage(FormPage):
 
     def body(self) -> ComposeResult:
         """The form, and what it amounts to."""
-        with Horizontal(id="plan"):
-            with VerticalScroll(id="form", classes="pane", can_focus=False) as form:
+        with Vertical(id="plan"):
+            with Form(id="form", classes="pane") as form:
                 form.border_title = "Plan"
                 yield from form_rows(FIELDS)
             with VerticalScroll(id="outlook", classes="pane") as outlook:

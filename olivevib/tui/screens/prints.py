@@ -22,7 +22,7 @@ from olivevib.tui.loader import guarded
 from olivevib.tui.printed import FIELDS, Printed, printed
 from olivevib.tui.screens.form_page import FormPage
 from olivevib.tui.screens.page import Help, Jump
-from olivevib.tui.widgets.form import form_rows
+from olivevib.tui.widgets.form import Form, form_rows
 
 
 class PrintsPage(FormPage):
@@ -49,7 +49,7 @@ class PrintsPage(FormPage):
 
     def body(self) -> ComposeResult:
         """The form, and what it amounts to."""
-        with VerticalScroll(id="form", classes="pane -short", can_focus=False) as form:
+        with Form(id="form", classes="pane -short") as form:
             form.border_title = "Print"
             yield from form_rows(FIELDS)
             yield Button("Write the print", id="make", variant="primary")

@@ -22,6 +22,7 @@ from olivevib.tui.loader import export_contents, guarded
 from olivevib.tui.screens.choose import ChooseScreen
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.views.outputs import REPORTS, Output, id_words, output_rows, preview_text
+from olivevib.tui.widgets.row_table import RowTable
 from olivevib.values import id_list
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ class ReportPage(Page):
 
     def body(self) -> ComposeResult:
         """The outputs and a preview of the marked one."""
-        yield DataTable(id="outputs", classes="pane", cursor_type="row")
+        yield RowTable(id="outputs")
         with VerticalScroll(id="contents", classes="pane"):
             yield Static("reading …", id="preview", classes="waits", markup=False)
 

@@ -22,6 +22,7 @@ from olivevib.tui.views.spectrum import SpectrumPlot, frame_of, next_peak, spect
 from olivevib.tui.views.tables import MARKER_COLUMNS, marker_row
 from olivevib.tui.widgets.old_note import OldNote
 from olivevib.tui.widgets.plot import Plot
+from olivevib.tui.widgets.row_table import RowTable
 
 PANES = ("orbits", "spectrum", "markers")
 
@@ -71,7 +72,7 @@ class ResultsPage(Page):
         with Container(id="results"):
             yield Plot(id="orbits", title="1 Orbits")
             yield Plot(id="spectrum", title="2 Spectrum")
-            yield DataTable(id="markers", classes="pane", cursor_type="row", zebra_stripes=True)
+            yield RowTable(id="markers", zebra_stripes=True)
 
     def on_mount(self) -> None:
         """Orbits first."""

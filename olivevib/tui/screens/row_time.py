@@ -21,7 +21,7 @@ from olivevib.tui.harmless import harmless
 from olivevib.tui.loader import book_lines, guarded
 from olivevib.tui.screens.form_page import FormPage
 from olivevib.tui.screens.page import Help, Jump
-from olivevib.tui.widgets.form import form_rows
+from olivevib.tui.widgets.form import Form, form_rows
 from olivevib.tui.work import Work
 
 
@@ -61,7 +61,7 @@ class RowTimePage(FormPage):
 
     def body(self) -> ComposeResult:
         """The form, what was found, the book of cameras."""
-        with VerticalScroll(id="form", classes="pane -short", can_focus=False) as form:
+        with Form(id="form", classes="pane -short") as form:
             form.border_title = "Row time"
             yield from form_rows(self.FIELDS)
             yield Button("Measure", id="measure", variant="primary")

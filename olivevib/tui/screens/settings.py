@@ -21,6 +21,7 @@ from olivevib.tui.views.setting_rows import (
     setting_cells,
     setting_words,
 )
+from olivevib.tui.widgets.row_table import RowTable
 
 
 class SettingsPage(Page):
@@ -44,7 +45,7 @@ class SettingsPage(Page):
 
     def body(self) -> ComposeResult:
         """One table."""
-        yield DataTable(id="settings", classes="pane", cursor_type="row")
+        yield RowTable(id="settings")
         yield Static(id="why", markup=False)
 
     def on_mount(self) -> None:

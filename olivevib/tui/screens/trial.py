@@ -19,6 +19,7 @@ from olivevib.tui.loader import STAGE_NAMES, TrialFacts, result_stamps, trial_fa
 from olivevib.tui.screens.edit import EditScreen
 from olivevib.tui.screens.page import Command, Help, Jump, Page
 from olivevib.tui.views.faults import error_text
+from olivevib.tui.widgets.row_table import RowTable
 from olivevib.tui.widgets.title import Title
 
 BESIDE = 32  # columns of the table of stages beside the reason
@@ -77,7 +78,7 @@ class TrialPage(Page):
 
     def body(self) -> ComposeResult:
         """Stages above, warnings and facts below."""
-        yield DataTable(id="stages", classes="pane", cursor_type="row")
+        yield RowTable(id="stages")
         with Horizontal(id="below"):
             with VerticalScroll(id="warnings", classes="pane"):
                 yield Static("reading …", id="warning-text", classes="waits", markup=False)

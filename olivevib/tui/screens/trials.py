@@ -21,6 +21,7 @@ from olivevib.tui.screens import load_pages, make_tool
 from olivevib.tui.screens.edit import EditScreen
 from olivevib.tui.screens.page import Help, Jump, Page
 from olivevib.tui.views.trial_list import columns_of, empty_text, matching, trial_cells, why_text
+from olivevib.tui.widgets.row_table import OpenTable
 
 MOST_ROWS = 200  # of one page: a table of thousands would be slow
 
@@ -38,7 +39,10 @@ class TrialsPage(Page):
     HELP_TEXT = Help(
         "Every trial under trials/ of this folder, with the state of its five stages: calibrate, "
         "track, reconstruct, analyse, compare. ● done · ◐ stale (an input changed since) · "
-        "○ missing · ✗ failed · □ blocked by an earlier stage · – skipped, its input is not there.",
+        "○ missing · ✗ failed · □ blocked by an earlier stage · – skipped, its input is not there. "
+        "n makes a new trial: marker size, ids, board and more are those of the trial that was "
+        "written last, and each line says so. N takes them from the marked trial, and its "
+        "calibration too: for cameras that have not been moved since.",
         "Quality says the worst that is known: clean (all done, no warning), warnings, stale, "
         "unfinished, differs (from the accelerometer), failed, unreadable.",
     )
@@ -50,7 +54,7 @@ class TrialsPage(Page):
         Binding("c", "capture", "Capture"),
         Binding("r", "run", "Run"),
         Binding("v", "results", "Results", show=False),
-        Binding("N", "copy", "New trial with the settings of this one", show=False),
+        Binding("N", "copy", "New trial like the marked one, with its calibration", show=False),
         Binding("g", "demo", "Make a simulated trial", show=False),
         Binding("o", "notes", "Notes", show=False),
         Binding("d", "archive", "Archive, or take back", show=False),
@@ -80,7 +84,7 @@ class TrialsPage(Page):
     def body(self) -> ComposeResult:
         """Search, table, why the marked trial is as it is; or what to do first."""
         yield Input(placeholder="part of a name, place or quality word", id="search")
-        yield DataTable(id="trials", classes="pane", cursor_type="row", zebra_stripes=True)
+        yield OpenTable(id="trials", zebra_stripes=True)
         yield Static(id="why", markup=False)
         yield Static(id="empty", markup=False)
 

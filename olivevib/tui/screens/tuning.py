@@ -22,6 +22,7 @@ from olivevib.tui.views.parameters import (
     stepped,
     typed_parameter,
 )
+from olivevib.tui.widgets.row_table import RowTable
 
 if TYPE_CHECKING:
     from olivevib.detection import DetectionSettings
@@ -44,7 +45,7 @@ class TuningPage(Page):
 
     def table(self) -> DataTable[object]:
         """The pane of the parameters, hidden at first."""
-        table: DataTable[object] = DataTable(id="parameters", classes="pane", cursor_type="row")
+        table: DataTable[object] = RowTable(id="parameters")
         table.border_title = "Parameters of the paper"
         table.border_subtitle = "+ - change · Enter types · Ctrl+S keeps them in trial.toml"
         table.add_columns(*COLUMNS)
