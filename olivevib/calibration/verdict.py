@@ -20,8 +20,7 @@ def verdict(e: Evidence, rig: StereoRig, sigma_px: tuple[float, float]) -> str:
         sd = 1e3 * float(np.sqrt(e.sure.published[LAG, LAG]))
         lag = 1e3 * e.fit.state.lag_s
         parts.append(
-            f"the right camera is {with_sigma(abs(lag), sd, 1)} ms "
-            f"{'late' if lag > 0 else 'early'}"
+            f"the right camera is {with_sigma(abs(lag), sd, 1)} ms {'late' if lag > 0 else 'early'}"
         )
     parts.append(f"weakest: {weak_spot(e)}")
     text = "; ".join(part for part in parts if part)
