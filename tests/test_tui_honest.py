@@ -119,7 +119,7 @@ async def test_a_page_whose_files_cannot_be_read_says_so_where_it_would_show_the
 @SIZES
 async def test_old_numbers_say_since_when_at_the_numbers(workspace, size):
     Trial.open(workspace / "trials/T04").changed({"markers.size_mm": 45.0})
-    old = "from before the change of markers.size_mm"
+    old = "from before the setting markers.size_mm changed"
     async with started(workspace, size) as (app, pilot):
         await press(pilot, "enter")
         assert old in flat(str(app.screen.query_one("#fact-text").render()))
@@ -141,22 +141,11 @@ async def test_numbers_of_now_carry_no_mark(workspace):
         assert "◐" not in screen_text(app)
 
 
-def test_the_words_follow_a_stale_stage_to_what_changed():
-    def stages(**states: tuple[str, str]) -> dict[str, object]:
-        names = ("calibrate", "track", "reconstruct", "analyse")
-        told = dict.fromkeys(names, ("done", "")) | states
-        return {"stages": {n: {"state": s, "reason": r} for n, (s, r) in told.items()}}
-
-    late = stages(
-        track=("stale", "left.nut changed"),
-        reconstruct=("stale", "track is stale"),
-        analyse=("stale", "reconstruct is stale"),
-    )
-    assert old_words(late, "analyse") == "from before the change of left.nut"
-    assert old_words(late, "calibrate") == ""
-    assert old_words(stages(), "reconstruct", "analyse") == ""
-    failed = stages(track=("failed", "no video."), analyse=("blocked", "track is failed"))
-    assert old_words(failed, "analyse") == "from before: track is failed now, no video."
+def test_the_words_are_those_of_show_of_the_first_stage_that_is_old():
+    told = {"track": None, "reconstruct": None, "analyse": "are from before left.nut changed"}
+    summary = {"stages": {name: {"old": old} for name, old in told.items()}}
+    assert old_words(summary, "reconstruct", "analyse") == "from before left.nut changed"
+    assert old_words(summary, "track", "reconstruct") == ""
 
 
 # -- values ---------------------------------------------------------------------------------------

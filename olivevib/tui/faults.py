@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from olivevib.trial import Trial
     from olivevib.trial.quality import StageLine
 
-BY_ANOTHER = re.compile(r"(\w+) is (?:stale|failed|blocked|missing|skipped)")
+BY_ANOTHER = re.compile(r"\w+ is (?:stale|failed|blocked|missing|skipped)")  # not by itself
 
 
 class Fault(NamedTuple):

@@ -116,7 +116,7 @@ class CalibrationPage(Page):
             for pane in PANES:
                 lacking = absent(value.summary, value.faults, "No calibration", "calibrate")
                 self.query_one(f"#{pane}", Plot).show(lacking)
-        self.query_one(OldNote).say(old_words(value.summary, "calibrate") if value.coverage else "")
+        self.query_one(OldNote).say(old_words(value.summary, "calibrate"))
         self._tell()
 
     def _tell(self) -> None:

@@ -48,7 +48,7 @@ class ComparePage(TimePage):
         """Draw the first sensor, or say why there is none."""
         if isinstance(value, Results):
             self._results = value
-            old = old_words(value.summary, "compare") if value.comparisons else ""
+            old = old_words(value.summary, "compare")
             self.query_one(OldNote).say(old)
             self.draw()
 

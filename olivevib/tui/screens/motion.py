@@ -52,8 +52,7 @@ class MotionPage(TimePage):
         """Draw the marker that was looked at last."""
         if isinstance(value, Results):
             self._results = value
-            there = value.trajectory is not None
-            old = old_words(value.summary, "reconstruct", "analyse") if there else ""
+            old = old_words(value.summary, "reconstruct", "analyse")
             self.query_one(OldNote).say(old)
             self.draw()
             text = phases_text(value.vibration, self.olive.palette)

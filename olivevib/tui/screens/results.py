@@ -91,7 +91,7 @@ class ResultsPage(Page):
             return
         self._results = value
         path = value.trajectory
-        self._old = old_words(value.summary, "reconstruct", "analyse") if path else ""
+        self._old = old_words(value.summary, "reconstruct", "analyse")
         self.query_one(OldNote).say(self._old)
         self._orbits = orbits_of(path, value.vibration, value.summary) if path else ()
         ids = [o.id for o in self._orbits]
@@ -124,8 +124,18 @@ class ResultsPage(Page):
         orbits.show(drawn if self._orbits else lacking("No path of any marker", "reconstruct"))
         line = partial(spectrum_plot, plot, self._cursor_hz) if plot else None
         spectrum.show(line or lacking("No spectrum", "analyse"))
-        for pane in (orbits, spectrum, self.query_one("#markers")):
+        for pane in (orbits, spectrum):
             pane.border_subtitle = f"{OLD} {self._old}" if self._old else ""
+        self.query_one("#markers").border_subtitle = self._table_words(found)
+
+    def _table_words(self, found: Results) -> str:
+        """What is to be known of the table: why it is empty, that it is old or goes on."""
+        if not found.summary["markers"]:
+            told = found.summary["stages"]["reconstruct"]
+            return f"no markers: reconstruct is {told['state']}"
+        parts = [f"{OLD} {self._old}"] if self._old else []
+        parts += ["→ more columns"] if self.has_class("-narrow") else []
+        return " · ".join(parts)
 
     @property
     def _plane(self) -> Plane:

@@ -84,8 +84,7 @@ class SpectrogramPage(Page):
             pane = self.query_one("#shades", Plot)
             found = value.results
             pane.show(partial(shade_plot, value.plot) if value.plot else self._lacking(found))
-            there = found.trajectory is not None
-            old = old_words(found.summary, "reconstruct", "analyse") if there else ""
+            old = old_words(found.summary, "reconstruct", "analyse")
             self.query_one(OldNote).say(old)
             text = phases_text(value.results.vibration, self.olive.palette)
             self.query_one("#numbers", Static).update(text)

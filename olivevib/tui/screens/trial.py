@@ -22,6 +22,7 @@ from olivevib.tui.views.faults import error_text
 from olivevib.tui.widgets.row_table import RowTable
 from olivevib.tui.widgets.title import Title
 
+TOLD_ABOVE = "stage-failed"  # the faults stand there whole
 BESIDE = 32  # columns of the table of stages beside the reason
 LOOK_S = 0.5  # how often the results are looked at while work runs
 FOUND_ON = {
@@ -141,8 +142,9 @@ class TrialPage(Page):
             warnings, known, count = error_text(facts.fault), Text(""), 1
         else:
             run = any(stage.state not in ("missing", "skipped") for stage in facts.stages)
-            warnings = warnings_text(summary["warnings"], run, palette, facts.faults)
-            count = len(summary["warnings"])
+            cautions = [w for w in summary["warnings"] if w["code"] != TOLD_ABOVE]
+            warnings = warnings_text(cautions, run, palette, facts.faults)
+            count = len(cautions)
             known = facts_text(summary, palette)
         self.query_one("#warning-text", Static).update(warnings)
         self.query_one("#fact-text", Static).update(known)

@@ -17,4 +17,4 @@ class OldNote(Static):
     def say(self, words: str) -> None:
         """Mark what stands below as old; "" takes the mark away."""
         self.display = bool(words)
-        self.update(f"{OLD} OLD NUMBERS, {words}. Esc, then r measures anew." if words else "")
+        self.update(f"{OLD} OLD NUMBERS, {words}: Esc, then r measures anew." if words else "")
