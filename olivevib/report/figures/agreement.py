@@ -71,10 +71,10 @@ def agreement(lines: Sequence[CommonLine]) -> str:
         )[0]
         low, high = 0.7 * min(a.min(), b.min()), 1.4 * max(a.max(), b.max())
         left.plot([low, high], [low, high], color=canvas.QUIET, lw=0.8, ls=(0, (4, 2)))
-        for these, face in ((full, canvas.LEFT), (~full, "none")):
+        for these, face in ((full, canvas.LEFT), (~full, "white")):
             xerr, yerr = np.nan_to_num(sigma_b[these]), np.nan_to_num(sigma_a[these])
             left.errorbar(b[these], a[these], xerr=xerr, yerr=yerr, fmt="o", color=canvas.LEFT,
-                          mfc=face, ms=3.5, elinewidth=0.8)  # fmt: skip
+                          markerfacecolor=face, mew=0.8, ms=4, elinewidth=0.8)  # fmt: skip
         left.set(xscale="log", yscale="log", xlim=(low, high), ylim=(low, high))
         left.set_xlabel("accelerometer, peak of the line, m/s²")
         left.set_ylabel("camera, m/s²")
@@ -82,17 +82,18 @@ def agreement(lines: Sequence[CommonLine]) -> str:
             axis.set_major_formatter("{x:g}")
             axis.set_minor_formatter("")
         left.grid(which="major")
-        each = _differences(strong)
+        each, size = _differences(strong), ((a + b) / 2)[full]
         right.axhline(0, color=canvas.QUIET, lw=0.8, ls=(0, (4, 2)))
-        right.plot((a + b)[full] / 2, each, "o", color=canvas.LEFT, ms=3.5, mew=0)
+        right.plot(size, each, "o", color=canvas.LEFT, ms=3.5, mew=0)
         if len(strong) >= FEWEST:
             for at, style in zip(limits_of_agreement(strong), ("-", ":", ":"), strict=True):
                 right.axhline(at, color=canvas.MARK, lw=1, ls=style)
                 right.text(1.01, at, f"{at:+.2g} %", transform=right.get_yaxis_transform(),
                            va="center", fontsize=6.5)  # fmt: skip
-        right.set_xscale("log")
+        if size.size and size.max() > 10 * size.min():  # within a decade a log axis has no labels
+            right.set_xscale("log")
+            right.xaxis.set_minor_formatter("")
         right.xaxis.set_major_formatter("{x:g}")
-        right.xaxis.set_minor_formatter("")
         right.set_xlabel("mean of both, m/s²")
         right.set_ylabel("camera less sensor, % of the mean")
         right.grid(axis="y")
