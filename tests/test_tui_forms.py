@@ -12,6 +12,7 @@ from tui_app import press, screen_text, shown, started
 
 from olivevib.trial import Trial
 from olivevib.tui.form_words import taken_words
+from olivevib.tui.libraries import FIELDS as LIBRARY_FIELDS
 from olivevib.tui.planned import FIELDS
 from olivevib.tui.screens.choose import ChooseScreen
 
@@ -134,3 +135,29 @@ async def test_the_table_of_a_plan_is_not_wrapped_and_its_hints_are_whole(worksp
             line.value = ""
             line.focus()
             await shown(pilot, field.hint)
+
+
+@SIZES
+async def test_the_form_of_libraries_cuts_no_hint_and_no_button(workspace, size):
+    async with started(workspace, size) as (app, pilot):
+        await press(pilot, "L")
+        for field in LIBRARY_FIELDS:
+            line = app.screen.query_one(f"#{field.name}", Input)
+            line.value = ""
+            line.focus()
+            await shown(pilot, field.hint, field.label)
+        await press(pilot, "down")
+        await shown(pilot, "Write the picture", "Draw a new library")
+
+
+async def test_the_buttons_for_accelerometers_are_whole(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "n")
+        for name, words in (("add_sensor", "+ one more  F2"), ("drop_sensor", "− out  F3")):
+            assert app.screen.query_one(f"#{name}").region.width >= len(words)
+
+
+async def test_a_trial_of_which_nothing_has_run_says_what_to_do(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "down", "enter")
+        assert "Nothing has run yet." in screen_text(app)

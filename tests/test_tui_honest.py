@@ -13,9 +13,7 @@ from textual.widgets import DataTable
 from tui_app import press, screen_text, started
 from tui_live import live
 
-from olivevib.errors import InputError
 from olivevib.trial import Trial
-from olivevib.trial.stages import BY_NAME, write_failure
 from olivevib.tui.screens.error import ErrorScreen
 from olivevib.tui.views.live import state_text
 from olivevib.tui.views.of_results import orbits_of
@@ -25,11 +23,7 @@ from olivevib.tui.views.tables import facts_text, marker_row
 from olivevib.tui.views.words import alone, with_spread
 
 SIZES = pytest.mark.parametrize("size", [(120, 40), (80, 24)], ids=["120x40", "80x24"])
-FAULT = InputError(
-    "the recordings of the trial are swapped: left is right.",
-    "Its markers fit the calibrated pair with left and right exchanged, and not as they are named.",
-    "Exchange [cameras.left] and [cameras.right] in trial.toml, and run again.",
-)
+FAULT = scene.FAULT
 
 
 @pytest.fixture(scope="session")
@@ -47,14 +41,6 @@ def workspace(measured, tmp_path, monkeypatch) -> Path:
     return tmp_path / "olive"
 
 
-def swapped(folder: Path) -> None:
-    """Reconstruction failed on the inputs of now, and left no result."""
-    for name in ("trajectory.h5", "vibration.h5", "comparison.h5"):
-        (folder / name).unlink()
-    trial, stage = Trial.open(folder), BY_NAME["reconstruct"]
-    write_failure(folder, stage, trial.fingerprint(stage), FAULT)
-
-
 def flat(text: str) -> str:
     """What is on screen without the lines of the panes and the breaks of wrapped text."""
     return " ".join(text.translate(dict.fromkeys(map(ord, "│▁▅▆▇█▃▂▄▊▎"), " ")).split())
@@ -65,7 +51,7 @@ def flat(text: str) -> str:
 
 @SIZES
 async def test_a_failure_is_told_whole_in_the_list_on_the_trial_and_behind_enter(workspace, size):
-    swapped(workspace / "trials/T04")
+    scene.swapped(workspace / "trials/T04")
     async with started(workspace, size) as (app, pilot):
         for part in (FAULT.what, "Next: Exchange [cameras.left]", FAULT.why):
             assert part in flat(screen_text(app))
@@ -86,7 +72,7 @@ async def test_a_failure_is_told_whole_in_the_list_on_the_trial_and_behind_enter
 
 @SIZES
 async def test_no_pane_reads_for_ever_where_a_stage_failed(workspace, size):
-    swapped(workspace / "trials/T04")
+    scene.swapped(workspace / "trials/T04")
     async with started(workspace, size) as (app, pilot):
         await press(pilot, "enter")
         for page in ("v", "v 2", "m", "c", "g"):

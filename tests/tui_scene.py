@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from olivevib.comparison import Comparison, LineDifference, Verdict
-from olivevib.errors import Caution
+from olivevib.errors import Caution, InputError
 from olivevib.files.prints.marker import marker_picture
 from olivevib.files.rig_file import write_rig
 from olivevib.files.store import write_stage
@@ -26,6 +26,7 @@ from olivevib.trial.records.comparison import comparison_file
 from olivevib.trial.records.tracks import CameraRecord, StoredTracks, tracks_file
 from olivevib.trial.records.trajectory import trajectory_file
 from olivevib.trial.records.vibration import vibration_file
+from olivevib.trial.stages import BY_NAME, write_failure
 from olivevib.vibration import (
     CandidateMotion,
     Line,
@@ -75,6 +76,12 @@ video = "right.avi"
 rig = "shared_rig.toml"
 """
 SENSOR = '[[accelerometers]]\nfile = "accelerometer.csv"\nmarker = 1\n'
+
+FAULT = InputError(
+    "the recordings of the trial are swapped: left is right.",
+    "Its markers fit the calibrated pair with left and right exchanged, and not as they are named.",
+    "Exchange [cameras.left] and [cameras.right] in trial.toml, and run again.",
+)
 
 
 def rig() -> StereoRig:
@@ -269,6 +276,14 @@ def remeasure(folder: Path, status: LineStatus = LineStatus.DIRECT, sensor: bool
     if sensor:
         write("compare", "comparison.h5", comparison_file, (comparison(),), ())
     return folder
+
+
+def swapped(folder: Path) -> None:
+    """Reconstruction failed on the inputs of now, and left no result."""
+    for name in ("trajectory.h5", "vibration.h5", "comparison.h5"):
+        (folder / name).unlink(missing_ok=True)
+    trial, stage = Trial.open(folder), BY_NAME["reconstruct"]
+    write_failure(folder, stage, trial.fingerprint(stage), FAULT)
 
 
 def workspace(folder: Path) -> Path:

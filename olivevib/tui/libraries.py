@@ -19,7 +19,7 @@ YES = ("yes", "no")
 DRAWN = 12  # markers that are drawn on the screen where no ids are named
 FIELDS = (
     Field("library", "marker library", "olive49; aruco:…, a TOML file", choices=LIBRARIES),
-    Field("ids", "marker ids", "drawn beside; empty: the first of them", choices=IDS),
+    Field("ids", "marker ids", "drawn below; empty: the first of them", choices=IDS),
     Field("picture", "picture of the first id", "ends in .png; empty: marker-ID.png"),
     Field("distance", "new: distance", "18: safe; 12: many codes", choices=("18", "15", "12")),
     Field("mirrors", "new: mirror images too", "yes: told apart; empty: no", choices=YES),

@@ -8,7 +8,7 @@ from typing import ClassVar
 from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Horizontal, VerticalScroll
+from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.message import Message
 from textual.widgets import Button, Static
 from textual.worker import get_current_worker
@@ -51,7 +51,7 @@ class LibrariesPage(FormPage):
 
     def body(self) -> ComposeResult:
         """The form, and what the library is."""
-        with Horizontal(id="plan"):
+        with Vertical(id="plan"):
             with Form(id="form", classes="pane") as form:
                 form.border_title = "Library"
                 yield from form_rows(FIELDS)

@@ -141,9 +141,9 @@ class TrialPage(Page):
         if summary is None:
             warnings, known, count = error_text(facts.fault), Text(""), 1
         else:
-            run = any(stage.state not in ("missing", "skipped") for stage in facts.stages)
+            run = any(stage.state in ("done", "stale", "failed") for stage in facts.stages)
             cautions = [w for w in summary["warnings"] if w["code"] != TOLD_ABOVE]
-            warnings = warnings_text(cautions, run, palette, facts.faults)
+            warnings = warnings_text(cautions, run or bool(facts.faults), palette, facts.faults)
             count = len(cautions)
             known = facts_text(summary, palette)
         self.query_one("#warning-text", Static).update(warnings)

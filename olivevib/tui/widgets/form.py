@@ -36,7 +36,8 @@ class Form(VerticalScroll, can_focus=False, inherit_bindings=False):
 def form_rows(fields: Iterable[Field]) -> Iterator[Widget]:
     """One row a field."""
     for field in fields:
-        pick = Button("…" if field.path else "▾", id=f"pick-{field.name}", compact=True)
+        shown, name = "…" if field.path else "▾", f"pick-{field.name}"
+        pick = Button(shown, id=name, classes="pick", compact=True)
         pick.can_focus = False  # for the mouse; keys use Ctrl+O in the line
         row: list[Widget] = [
             Label(field.label, markup=False),
