@@ -24,6 +24,7 @@ from olivevib.vibration import (
     SamplingFacts,
     Spectrum,
     Vibration,
+    largest,
     survey,
 )
 from olivevib.vibration.figures import NO_LINE, figures, unknown
@@ -259,6 +260,8 @@ def summary(path: Trajectory, lines: tuple[Line, ...]) -> dict[str, Any]:
             "amplitude_mm": dict(zip("xyz", number, strict=True)),
             "amplitude_sigma_mm": dict(zip("xyz", sigma, strict=True)),
             "acceleration_rms_m_s2": 9.8 + m if surely else None,
+            "amplitude_largest_mm": None if number[0] is None else largest(each)[0],
+            "amplitude_largest_sigma_mm": None if number[0] is None else largest(each)[1],
             "displacement_pp_mm": 4.2 + m,
         })  # fmt: skip
     return {

@@ -72,7 +72,7 @@ def test_page_is_well_formed_and_has_every_section_and_figure(direct):
     assert {s.name for s in SECTIONS} <= set(ids)
     assert "Not in this report" not in direct
     figures = [attrs for tag, attrs in reader.tags if tag == "svg"]
-    assert len(figures) == 20
+    assert len(figures) == 21
     assert all(attrs["aria-label"] and attrs["viewbox"] for attrs in figures)
     assert sum(tag == "figcaption" for tag, _ in reader.tags) == len(figures)
 

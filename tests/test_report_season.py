@@ -37,7 +37,7 @@ def test_one_row_a_trial_with_status_and_unit(entries):
     assert [r[0] for r in rows] == ["T1", "T2", "T3", "T4"]
     assert rows[0][4] == "Coratina"
     assert rows[3][4] == "not known"
-    assert rows[3][6] == "none"  # the marker that moves most in this scene shows no line
+    assert rows[3][6] == "ambiguous"  # the marker with the largest line, not that without one
     assert rows[0][9].endswith("%")
 
 

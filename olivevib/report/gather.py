@@ -18,7 +18,6 @@ from olivevib.report.figures.agreement import CommonLine
 from olivevib.report.season import SeasonEntry
 from olivevib.report.season_table import trial_rows
 from olivevib.trial.stages import STAGES
-from olivevib.trial.standing import standing
 from olivevib.trial.summary import summary
 from olivevib.vibration import SamplingFacts
 from olivevib.vibration.verdict import SWAY_HZ
@@ -35,10 +34,11 @@ def content_of(trial: Trial) -> ReportContent:
     """Everything that the report of ``trial`` shows; None and () where a stage has not run."""
     settings, tracks, band = trial.settings, trial.tracks, trial.settings.vibration.band_hz
     fit = trial.reconstruction.motion if trial.reconstruction else None
+    facts = within(trial.folder, summary(trial))
     return ReportContent(
         name=trial.name,
         record=_record(trial),
-        summary=within(trial.folder, summary(trial)),
+        summary=facts,
         places=places_of(trial),
         simulated=settings.session.simulated,
         rig=trial.rig,
@@ -48,10 +48,7 @@ def content_of(trial: Trial) -> ReportContent:
         trajectory=trial.trajectory,
         vibration=trial.vibration,
         comparisons=trial.comparison,
-        cautions=tuple(
-            Caution(c.code, within(trial.folder, c.text), within(trial.folder, c.remedy))
-            for c in (*standing(trial), *trial.cautions)
-        ),
+        cautions=tuple(Caution(w["code"], w["text"], w["remedy"]) for w in facts["warnings"]),
         sway_hz=SamplingFacts(2 * SWAY_HZ, band_hz=band).sway_hz if band else SWAY_HZ,
         next_time=() if fit is None else fit.next_time,
         provenance=provenance(trial),

@@ -19,7 +19,7 @@ from olivevib.report.lines import MEANING
 from olivevib.report.plates import Plate, plates
 from olivevib.report.verdict import verdict
 from olivevib.signals import State
-from olivevib.vibration import LineStatus
+from olivevib.trial.summary import SETTLED
 from olivevib.vibration.types import CRYSTAL
 
 
@@ -33,7 +33,6 @@ class Section:
 
 
 LONG = 1500  # characters of a verdict or a reason
-SURE = {LineStatus.DIRECT, LineStatus.CONFIRMED}  # a line can be no surer
 MOST_DROPPED = 20  # dropped calibration views that are named
 MOST_PAIRS = 66  # distances listed as a table: 12 markers
 _WANTING = {  # of a section whose stage is done
@@ -110,7 +109,7 @@ def page_facts(content: ReportContent, tick: Tick = silent) -> dict[str, Any]:
         "clock_ppm": f"{1e6 * CRYSTAL:.0f}",
         "meanings": [(str(s), words) for s, words in MEANING.items() if s in statuses],
         "reasons": _reasons(content),
-        "next_time": [] if statuses <= SURE else [clean(a, LONG) for a in content.next_time],
+        "next_time": _advice(content),
         "record": tables.record_sections(content),
         "rig": tables.rig_pairs(content),
         "cameras": tables.camera_columns(content),
@@ -191,6 +190,12 @@ def _distances(content: ReportContent) -> list[tuple[str, str, str]]:
     """The table of distances, where it is short enough to be read."""
     pairs = pair_distances(content.trajectory) if content.trajectory is not None else []
     return tables.distance_rows(pairs) if len(pairs) <= MOST_PAIRS else []
+
+
+def _advice(content: ReportContent) -> list[str]:
+    """What to do another time, where it would make a frequency surer."""
+    settled = all(line.status in SETTLED for line in content.lines().values())
+    return [] if settled else [clean(advice, LONG) for advice in content.next_time]
 
 
 def _reasons(content: ReportContent) -> list[tuple[str, str]]:

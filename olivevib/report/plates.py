@@ -17,6 +17,7 @@ from olivevib.report.words import number
 from olivevib.vibration import Spectrum, largest
 
 ROWS = 8  # markers in one figure
+SPECTRA = 4  # markers in one figure of spectra: small figures fill a page of paper better
 CLOSE_S = 1.0  # length of the close-up
 SPECTROGRAMS = 3  # markers whose spectrogram is drawn
 STRIPS = 36  # state strips in one figure
@@ -150,7 +151,7 @@ def _spectra(content: ReportContent) -> Iterator[Job]:
     if any(line.status in (*KNOWN, *OPEN) for line in spectrum.lines):
         yield ("frequency", captions.FREQUENCY, lambda: figures.frequencies(spectrum, names, fold))
     ids = _finite_ids(spectrum)
-    for group in _groups(ids, ROWS):
+    for group in _groups(ids, SPECTRA):
         words = captions.AMPLITUDE + (captions.NO_FLOOR if content.continuous else captions.FLOOR)
         words = _once(words + _window_words(spectrum, content), group, ids)
         yield ("spectra", words, _bound(figures.amplitude_spectra, spectrum, names, group, band))

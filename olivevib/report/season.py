@@ -22,6 +22,7 @@ from olivevib.report.outliers import outliers
 from olivevib.report.page import environment
 from olivevib.report.plates import Plate
 from olivevib.report.season_trouble import Trouble, problems, trouble, trouble_words
+from olivevib.report.tables import frequency_sigma
 from olivevib.report.words import NOT_KNOWN, count, known, measure
 
 QUANTITIES = (
@@ -162,7 +163,7 @@ def season_row(entry: SeasonEntry) -> tuple[str, ...]:
     line, moved, shaken = NOT_KNOWN, NOT_KNOWN, NOT_KNOWN
     if best is not None:
         status = clean(best.get("frequency_status") or NOT_KNOWN, 20)
-        hz = measure(best.get("frequency_hz"), "Hz", best.get("frequency_sigma_hz"))
+        hz = measure(best.get("frequency_hz"), "Hz", frequency_sigma(best))
         line = f"{hz} ({status})" if status in SURE else status
         moved = f"{measure(best.get('displacement_pp_mm'), 'mm', digits=3)} (marker {best['id']})"
         shaken = measure(best.get("acceleration_rms_m_s2"), "m/s2", digits=3)
@@ -183,7 +184,7 @@ def season_row(entry: SeasonEntry) -> tuple[str, ...]:
 
 
 def _moved(marker: Mapping[str, Any]) -> float:
-    value = marker.get("displacement_pp_mm")
+    value = marker.get("amplitude_largest_mm")
     return float(value) if value is not None and known(value) else -1.0
 
 

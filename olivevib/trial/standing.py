@@ -34,9 +34,12 @@ def old_results(trial: Trial, states: Mapping[str, StageState]) -> dict[str, str
     return out
 
 
-def standing(trial: Trial) -> tuple[Caution, ...]:
-    """What a person must know before any number: failures, results from before a change."""
-    states = trial.states()
+def standing(trial: Trial, states: Mapping[str, StageState] | None = None) -> tuple[Caution, ...]:
+    """What a person must know before any number: failures, results from before a change.
+
+    states: those of the trial, where they are known already.
+    """
+    states = trial.states() if states is None else states
     found = (_fault(trial, name, s) for name, s in states.items() if _root(name, states)[0] == name)
     out = [caution for caution in found if caution is not None]
     by_root: dict[str, list[str]] = {}

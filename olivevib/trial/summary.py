@@ -23,7 +23,7 @@ from olivevib.vibration import LineStatus, MarkerMotion, largest
 if TYPE_CHECKING:
     from olivevib.trial.trial import Trial
 
-SURE = (LineStatus.DIRECT, LineStatus.CONFIRMED)
+SETTLED = (LineStatus.DIRECT, LineStatus.CONFIRMED, LineStatus.NONE)  # advice changes nothing
 KNOWN = (LineStatus.DIRECT, LineStatus.CONFIRMED, LineStatus.SUPPORTED)
 
 
@@ -41,7 +41,7 @@ def summary(trial: Trial) -> dict[str, Any]:
         "vibration": vibration_summary(trial.vibration, trial.trajectory),
         "comparison": _comparison(trial.comparison),
         "comparisons": [sensor_summary(c) for c in trial.comparison],
-        "warnings": [_caution(c) for c in (*standing(trial), *trial.cautions)],
+        "warnings": [_caution(c) for c in (*standing(trial, states), *trial.cautions)],
     }
 
 
@@ -183,7 +183,7 @@ def _motion(row: MarkerMotion | None, advice: tuple[str, ...]) -> dict[str, Any]
         "frequency_candidates_hz": [float(f) for f in line.candidates_hz],
         "frequency_probabilities": [float(p) for p in line.probabilities],
         "frequency_reasons": [r for r in line.reasons if r not in advice],
-        "frequency_next_time": [] if line.status in SURE else list(advice),
+        "frequency_next_time": [] if line.status in SETTLED else list(advice),
         "amplitude_mm": _axes(line.amplitude),
         "amplitude_sigma_mm": _axes(line.amplitude_sigma),
         "amplitude_largest_mm": known(size),

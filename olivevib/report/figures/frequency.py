@@ -20,7 +20,7 @@ def frequencies(spectrum: Spectrum, names: Mapping[int, str], nyquist_hz: float)
 
     Uprights stand at multiples of half the sampling rate, where the true frequency folds.
     """
-    height = 0.75 + 0.24 * len(spectrum.lines)
+    height = 0.75 + 0.2 * len(spectrum.lines)
     nyquist = nyquist_hz
     highest = max((f for line in spectrum.lines for f in _all(line)), default=nyquist)
     top = max(nyquist, highest) * 1.05

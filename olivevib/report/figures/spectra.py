@@ -55,7 +55,7 @@ def amplitude_spectra(
     The dashed upright is the dominant line as the camera sees it, the triangle its fitted
     amplitude, the dotted level the noise floor of what was measured.
     """
-    height = 0.66 + 0.98 * len(ids)
+    height = 0.66 + 0.76 * len(ids)
     lines = dict(zip(spectrum.ids.tolist(), spectrum.lines, strict=True))
 
     def paint(figure: Figure) -> None:
@@ -116,7 +116,7 @@ def _totals(
     total, least = shown
     columns = 3
     rows = -(-len(ids) // columns)
-    height = 0.66 + 1.1 * rows
+    height = 0.66 + 0.78 * rows
     lines = dict(zip(spectrum.ids.tolist(), spectrum.lines, strict=True))
 
     def paint(figure: Figure) -> None:

@@ -48,7 +48,7 @@ def strips(
 def visibility(rows: Sequence[Strip], part: int = 0) -> str:
     """State strips over the trial clock with a key of the states that occur."""
     occurring = [s for s in State if any((state == s).any() for _, _, state in rows)]
-    height = 0.8 + 0.15 * len(rows)
+    height = 0.8 + 0.105 * len(rows)
 
     def paint(figure: Figure) -> None:
         ax = canvas.rows_and_columns(
@@ -69,7 +69,7 @@ def visibility(rows: Sequence[Strip], part: int = 0) -> str:
         ax.set_xlim(min(starts, default=0.0), max(ends, default=1.0))
         ax.set_ylim(len(rows) - 0.4, -0.6)
         ax.set_yticks(range(len(rows)), [label for label, _, _ in rows])
-        ax.tick_params(axis="y", length=0, labelsize=6.5, labelcolor=canvas.INK)
+        ax.tick_params(axis="y", length=0, labelsize=6, labelcolor=canvas.INK)
         ax.spines["left"].set_visible(False)
         ax.set_xlabel("trial clock, s")
         _key(figure, occurring)

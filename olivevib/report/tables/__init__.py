@@ -7,6 +7,7 @@ from olivevib.report.tables.comparison import comparison_lines, comparison_pairs
 from olivevib.report.tables.markers import (
     candidate_accelerations,
     distance_rows,
+    frequency_sigma,
     marker_rows,
     phase_rows,
     phase_word,
@@ -45,6 +46,7 @@ __all__ = [
     "distance_rows",
     "dose_rows",
     "figure_rows",
+    "frequency_sigma",
     "marker_rows",
     "motion_rows",
     "orbit_rows",

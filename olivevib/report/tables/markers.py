@@ -65,7 +65,7 @@ def marker_rows(content: ReportContent) -> list[MarkerRow]:
         sizes, sigmas = marker.get("amplitude_mm") or {}, marker.get("amplitude_sigma_mm") or {}
         x, y, z = (measure(sizes.get(a), "", sigmas.get(a), digits=3) for a in "xyz")
         listed = marker.get("frequency_candidates_hz") or []
-        hz, sigma = marker.get("frequency_hz"), _both(marker)
+        hz, sigma = marker.get("frequency_hz"), frequency_sigma(marker)
         most = (marker.get("amplitude_largest_mm"), marker.get("amplitude_largest_sigma_mm"))
         rows.append(
             MarkerRow(
@@ -88,7 +88,7 @@ def marker_rows(content: ReportContent) -> list[MarkerRow]:
     return rows
 
 
-def _both(marker: Mapping[str, Any]) -> float | None:
+def frequency_sigma(marker: Mapping[str, Any]) -> float | None:
     """Sigma of a frequency, of the fit and of the camera's own clock together."""
     sigma, clock = marker.get("frequency_sigma_hz"), marker.get("frequency_clock_sigma_hz")
     if sigma is None or not known(sigma):
