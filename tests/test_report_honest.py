@@ -47,6 +47,8 @@ def test_lines_that_a_fitted_path_cannot_hold_are_left_out_of_the_comparison_and
     assert [row[0] for row in rows] == ["12.00\u00a0Hz"]
     assert "12.90\u00a0Hz (0.1402" in left and "36.01\u00a0Hz" in left
     assert " ".join(left.split()) in " ".join(Reader(render_page(fitted)).visible.split())
+    of_both = np.hypot(np.hypot(0.05, 0.0018 * 11.52), 0.02)  # noise, gain, sensor
+    assert rows[0][3].replace("\u00a0", " ") == f"0.030 ± {of_both:.3f} m/s²"
     rows, left = comparison_lines(scene.content([1, 2, 17], seconds=5.0), compared)
     assert len(rows) == 3 and left == ""
 

@@ -22,7 +22,7 @@ CLOSE = (
 )
 ORBITS = (
     "Path about the mean position in three projections, all on one scale of ± {reach} mm."
-    " Dots: single frames, evenly"
+    " Dots: {each}, evenly"
     " chosen in long records. Thick: the ellipse of the dominant line."
 )
 SPECTROGRAM = (

@@ -75,8 +75,8 @@ def _space(content: ReportContent) -> Iterator[Job]:
             figures.time_series, path, names, group, figures.whole(path), content.phases
         ))  # fmt: skip
     window, closest = _close(content, ids)
+    each = "instants of the fitted motion" if content.continuous else "single frames"
     if window is not None:
-        each = "instants of the fitted motion" if content.continuous else "single frames"
         caption = captions.CLOSE.format(length=number(window.end_s - window.start_s, 2), each=each)
         yield (
             "motion",
@@ -86,7 +86,7 @@ def _space(content: ReportContent) -> Iterator[Job]:
     yield from _changing(content, ranked(content, ids))
     reach = figures.orbit_reach_mm(path, ids)
     for group in _groups(ids, figures.MOST_ACROSS):
-        caption = _once(captions.ORBITS.format(reach=number(reach, 3)), group, ids)
+        caption = _once(captions.ORBITS.format(reach=number(reach, 3), each=each), group, ids)
         yield ("orbits", caption, _bound(figures.orbits, path, names, group, reach, lines))
     yield from body_jobs(content, ranked(content, ids))
     pairs = figures.pair_distances(path)

@@ -65,7 +65,7 @@ def comparison_lines(
     """Each line that both may see: frequency, camera, sensor, difference, phase; and what is left.
 
     A path that was fitted holds one line and its harmonics. Of others it says nothing: those are
-    left out of the rows and named in words.
+    left out of the rows and named in words. ± of the camera: its noise and the sigma of the gain.
     """
     out, left = [], []
     for each in comparison.lines:
@@ -73,10 +73,12 @@ def comparison_lines(
             size = measure(each.sensor_m_s2, "m/s2", each.sensor_sigma_m_s2)
             left.append(f"{number(each.f_hz, 4)}\u00a0Hz ({size})")
             continue
-        sigma = float(np.hypot(each.optical_sigma_m_s2, each.sensor_sigma_m_s2))
+        scale = comparison.gain_sigma if np.isfinite(comparison.gain_sigma) else 0.0
+        camera = float(np.hypot(each.optical_sigma_m_s2, scale * each.optical_m_s2))
+        sigma = float(np.hypot(camera, each.sensor_sigma_m_s2))
         out.append((
             measure(each.f_hz, "Hz"),
-            measure(each.optical_m_s2, "m/s2", each.optical_sigma_m_s2),
+            measure(each.optical_m_s2, "m/s2", camera),
             measure(each.sensor_m_s2, "m/s2", each.sensor_sigma_m_s2),
             measure(each.optical_m_s2 - each.sensor_m_s2, "m/s2", sigma),
             measure(each.phase_deg, "°", each.phase_sigma_deg),
