@@ -194,9 +194,18 @@ def finished(
         beside=ready.pixels.beside if kind == "steady" else 0.0,
         offset_lost=seen.offset_lost,
         stray=seen.stray,
+        row_sigmas=_row_sigmas(ready.anchor, best.theta[3:5]),
     )
     decision = decide(facts, ready.anchor, ready.settings)
     return _result(ready, model, best, facts, decision, (markers, timing, kind))
+
+
+def _row_sigmas(anchor: Anchor, rows_s: Floats) -> float:
+    """How far the row times (2,) lie from the anchor's, both together, in its sigmas."""
+    told = np.array([anchor.left_row_time_s, anchor.right_row_time_s])
+    sigma = np.array([anchor.left_row_time_sigma_s, anchor.right_row_time_sigma_s])
+    known = np.isfinite(sigma) & (sigma > 0)
+    return float(np.linalg.norm((rows_s - told)[known] / sigma[known]))
 
 
 def _result(
