@@ -14,6 +14,7 @@ import report_scene as scene
 from olivevib.report import figures
 from olivevib.report.figures import canvas
 from olivevib.report.figures.boxes import boxes
+from olivevib.report.figures.distances import _square
 from olivevib.report.figures.scene import _oblique
 from olivevib.report.figures.sensor import overlay_window
 from olivevib.report.figures.spectra import Band, _limits, noise_floor
@@ -166,6 +167,14 @@ def test_distances_of_a_rigid_pair_have_no_spread(path):
     assert rigid.sd_mm < 1e-9
     assert rigid.frames == int(path.seen[:, 0].sum())
     assert len(pairs) == 3
+
+
+def test_every_square_of_the_map_holds_its_number_and_darkens_with_the_spread():
+    """Squares of one size (a number fits); opacity rises with the standard deviation."""
+    squares = [_square(0, 0, share) for share in (0.0, 0.3, 1.0)]
+    assert {square.get_width() for square in squares} == {0.94}
+    shades = [square.get_alpha() for square in squares]
+    assert shades == sorted(shades) and shades[0] < shades[-1]
 
 
 def test_pairs_that_hardly_met_are_left_out(path):

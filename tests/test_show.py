@@ -15,6 +15,7 @@ from olivevib.cli.summary_text import concise, frequency, significant, summary_t
 from olivevib.errors import InputError
 from olivevib.reconstruction import Trajectory
 from olivevib.trial import Trial
+from olivevib.trial.quality import quality_of, stage_lines
 from olivevib.trial.records.tracks import CameraRecord, StoredTracks
 from olivevib.trial.stages import BY_NAME, write_failure
 from olivevib.trial.standing import standing
@@ -87,6 +88,15 @@ def test_why_a_stage_failed_and_what_to_do_is_kept(trial, capsys):
     assert facts["stages"]["analyse"]["old"].endswith("(reconstruct failed: left is right)")
 
 
+def test_what_keeps_a_stage_from_running_is_told_once_with_its_remedy(trial):
+    (trial.folder / "left.avi").rename(trial.folder / "moved.avi")
+    (told,) = standing(trial)
+    assert told.code == "stage-failed"
+    assert told.text.startswith("track cannot run: ") and "left.avi is missing" in told.text
+    assert told.remedy.startswith("Put the file back")
+    assert "left.avi is missing" in summary(trial)["stages"]["analyse"]["old"]
+
+
 def test_a_comparison_that_nobody_asks_for_any_more_says_so(trial):
     text = (trial.folder / "trial.toml").read_text(encoding="utf-8")
     kept = [line for line in text.split("\n") if not line.strip().startswith("marker = ")]
@@ -95,6 +105,8 @@ def test_a_comparison_that_nobody_asks_for_any_more_says_so(trial):
     assert [c.code for c in standing(now)] == ["results-left"]
     told = block(summary_text(summary(now)), "accelerometer")
     assert "no longer asked for" in told.split("\n")[1]
+    assert quality_of(stage_lines(trial), trial).word == "clean"
+    assert quality_of(stage_lines(now), now).why == "1: results-left"
 
 
 def test_the_largest_amplitude_is_the_long_half_axis_of_the_orbit():
@@ -180,7 +192,7 @@ def test_seen_is_a_share_of_the_frames_of_both_cameras_where_a_motion_was_fitted
     path = report_scene.trajectory([1, 2, 17], 4.0)
     both = report_scene.tracks(path)
     camera = CameraRecord(
-        video="left.mkv", codec="mjpeg", size_px=(1280, 720), frames=120, dropped=0, damaged=0,
+        video="left.avi", codec="mjpeg", size_px=(1280, 720), frames=120, dropped=0, damaged=0,
         stamp_kind="container", method="line", rate_hz=30.0, rate_sigma_hz=4e-4, jitter_s=3e-4,
         worst_s=1e-3, row_time_s=0.0, row_time_sigma_s=0.0, row_time_source="global",
     )  # fmt: skip

@@ -46,14 +46,18 @@ def quality_of(stages: tuple[StageLine, ...], trial: Trial) -> Quality:
             return Quality(said, f"{bad.name}: {bad.reason}")
     if not trial.vibration:
         return Quality("unfinished", "there is nothing to analyse yet")
-    return _quality_of_results(trial)
+    asked = all(s.state != "skipped" for s in stages if s.name == "compare")
+    return _quality_of_results(trial, asked)
 
 
-def _quality_of_results(trial: Trial) -> Quality:
-    for comparison in trial.comparison:
+def _quality_of_results(trial: Trial, asked: bool) -> Quality:
+    """asked: whether a comparison is; one that is left over from before counts as a warning."""
+    for comparison in trial.comparison if asked else ():
         if comparison.verdict.value == "differs":
             return Quality("differs", comparison.reason)
-    cautions = trial.cautions
-    if cautions:
-        return Quality("warnings", f"{len(cautions)}: {', '.join(c.code for c in cautions)}")
+    codes = [c.code for c in trial.cautions]
+    if trial.comparison and not asked:
+        codes.insert(0, "results-left")
+    if codes:
+        return Quality("warnings", f"{len(codes)}: {', '.join(codes)}")
     return Quality("clean", "every stage is done and none of them warned")
