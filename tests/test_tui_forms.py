@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import tui_scene as scene
+from textual.coordinate import Coordinate
 from textual.widgets import DataTable, Input, Static
 from tui_app import press, screen_text, shown, started
 
@@ -115,6 +116,18 @@ async def test_the_list_goes_to_its_ends_and_tells_that_enter_opens(workspace, s
         footer = screen_text(app).split("\n")[-1]
         for words in ("Open", "New trial", "Search", "Capture", "Run", "Help"):
             assert words in footer
+
+
+async def test_a_row_drawn_before_its_column_was_widened_is_drawn_again(workspace):
+    async with started(workspace) as (app, pilot):
+        await press(pilot, "enter")
+        table = app.screen.query_one("#stages", DataTable)
+        long = "x" * 40
+        table.update_cell_at(Coordinate(0, 1), long, update_width=True)
+        for y in range(table.size.height):
+            table.render_line(y)  # as the screen may, before the table is idle
+        await press(pilot)
+        assert long in screen_text(app)
 
 
 # -- words that are not cut -----------------------------------------------------------------------

@@ -19,6 +19,7 @@ from tui_live import board, live
 
 from olivevib.errors import Caution, InputError
 from olivevib.pipeline.machine import Check
+from olivevib.trial import Trial
 from olivevib.tui.capturing import Recorded, Recording, told_of
 from olivevib.tui.screens.live import LivePage
 from olivevib.tui.views.progress import Progress
@@ -177,6 +178,20 @@ async def test_a_running_capture_looks_as_it_did(svg, workspace, size, monkeypat
         await settle(pilot)
         if not await looks(app, pilot, svg(name=name_of("live verdict", size))):
             changed.append("verdict")
+    assert not changed
+
+
+@pytest.mark.parametrize("size", SIZES, ids=["120x40", "80x24"])
+async def test_failed_and_old_results_look_as_they_did(svg, workspace, size):
+    changed = []
+    Trial.open(workspace / "trials/2026-11-20_T04").changed({"markers.size_mm": 45.0})
+    scene.swapped(workspace / "trials/2026-11-20_T05")
+    walk = (("old", "enter v 3"), ("failed", "escape escape down"), ("failed_trial", "enter"))
+    async with started(workspace, size) as (app, pilot):
+        for picture, keys in walk:
+            await press(pilot, *keys.split())
+            if not await looks(app, pilot, svg(name=name_of(picture, size))):
+                changed.append(picture)
     assert not changed
 
 

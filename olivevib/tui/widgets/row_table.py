@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 from textual.widgets import DataTable
+from textual.widgets._data_table import CellKey
 
 
 class RowTable(DataTable[object]):
@@ -18,6 +19,15 @@ class RowTable(DataTable[object]):
 
     def __init__(self, *, id: str, zebra_stripes: bool = False) -> None:
         super().__init__(id=id, classes="pane", cursor_type="row", zebra_stripes=zebra_stripes)
+
+    def _update_column_widths(self, updated_cells: set[CellKey]) -> None:
+        """Widen the columns; lines that were drawn with the old widths are drawn again.
+
+        Textual keeps such lines (8.2.8): a row drawn between update and idle stayed cut.
+        """
+        super()._update_column_widths(updated_cells)
+        self._clear_caches()
+        self.refresh()
 
 
 class OpenTable(RowTable):
