@@ -9,7 +9,7 @@ import pytest
 import tui_scene as scene
 from textual.coordinate import Coordinate
 from textual.widgets import DataTable, Input, Static
-from tui_app import press, screen_text, shown, started
+from tui_app import press, screen_text, settle, shown, started
 
 from olivevib.trial import Trial
 from olivevib.tui.form_words import taken_words
@@ -54,7 +54,7 @@ async def test_what_a_new_trial_takes_over_is_said_at_each_line_and_below(worksp
         assert "marker size 100 mm" in below
         assert "marker size 100 mm" in screen_text(app)  # without scrolling to the line
         app.screen.query_one("#size", Input).focus()
-        await press(pilot)
+        await settle(pilot)
         assert "100" in row_of(app, "size")
         assert "from A4" in row_of(app, "size")
         await press(pilot, "end", *["backspace"] * 3, "text:60")
@@ -126,7 +126,7 @@ async def test_a_row_drawn_before_its_column_was_widened_is_drawn_again(workspac
         table.update_cell_at(Coordinate(0, 1), long, update_width=True)
         for y in range(table.size.height):
             table.render_line(y)  # as the screen may, before the table is idle
-        await press(pilot)
+        await settle(pilot)
         assert long in screen_text(app)
 
 
