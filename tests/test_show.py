@@ -72,7 +72,10 @@ def test_a_report_of_old_numbers_says_so_on_the_terminal(trial, capsys):
     )
     page = (trial.folder / "report.html").read_text(encoding="utf-8")
     assert "reconstruct, analyse and compare are not up to date" in page
-    assert "from before the setting markers.size_mm changed" in page
+    mark = "<strong>These numbers are from before the setting markers.size_mm changed.</strong>"
+    marked = [part[: part.index('"')] for part in page.split('<section id="')[1:] if mark in part]
+    assert {"markers", "frequency", "comparison"} <= set(marked)
+    assert not {"calibration", "seen"} & set(marked)
 
 
 def test_why_a_stage_failed_and_what_to_do_is_kept(trial, capsys):

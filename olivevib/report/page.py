@@ -97,6 +97,7 @@ def page_facts(content: ReportContent, tick: Tick = silent) -> dict[str, Any]:
         "name": clean(content.name),
         "simulated": content.simulated,
         "sections": shown,
+        "old": _old(content),
         "missing": [(s.title, _why(content, s)) for s in SECTIONS if s not in shown],
         "plates": drawn,
         "verdict": verdict(content),
@@ -138,6 +139,12 @@ def page_facts(content: ReportContent, tick: Tick = silent) -> dict[str, Any]:
         "command": clean(content.provenance.get("command", "")),
         "provenance": tables.provenance_pairs(content),
     }
+
+
+def _old(content: ReportContent) -> dict[str, str]:
+    """Of each stage whose result is not that of the trial as it is now: why."""
+    stages = content.summary.get("stages") or {}
+    return {name: clean(s["old"], LONG) for name, s in stages.items() if (s or {}).get("old")}
 
 
 def _comparisons(content: ReportContent) -> list[tuple[Any, ...]]:
