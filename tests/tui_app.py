@@ -29,7 +29,7 @@ async def settle(pilot: Pilot[None]) -> None:
         await quiet(pilot)
 
 
-async def quiet(pilot: Pilot[None], turns: int = 5) -> None:
+async def quiet(pilot: Pilot[None], turns: int = 3) -> None:
     """Wait until nothing has been waiting for a few turns, however loaded the machine is."""
     calm = 0
     while calm < turns:
