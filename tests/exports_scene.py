@@ -39,6 +39,7 @@ def make_trajectory(n: int = 50, ids: tuple[int, ...] = (7, 2, 31), seed: int = 
         epipolar_px=xyz[..., 0] / 1e3,
         frame="left camera",
         method="optimal",
+        sigma_rig_mm=sigma / 10,  # every trajectory of a calibrated rig has it
     )
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,12 @@ class ContinuousFit:
     chi2: float
     candidates_hz: tuple[float, ...] = ()
     evidence: tuple[float, ...] = ()
+
+
+_SAMPLES = (  # arrays (N, M, …), beside sigma_rig_mm
+    *("sample_t_s", "xyz_mm", "sigma_xyz_mm", "covariance_mm2"),
+    *("rotation_rad", "sigma_rotation_rad", "state", "epipolar_px"),
+)
 
 
 @dataclass(frozen=True)
@@ -94,6 +101,34 @@ class Trajectory:
     def seen(self) -> Bools:
         """(N, M) True where a marker has a position."""
         return np.asarray(np.isfinite(self.xyz_mm).all(axis=2))
+
+    def rows(self, which: Ints | Bools) -> Trajectory:
+        """The instants ``which`` of the N alone."""
+        kept = self._samples(lambda values: values[which])
+        return replace(self, t_s=self.t_s[which], **kept)
+
+    def markers(self, which: Ints) -> Trajectory:
+        """The markers in the columns ``which`` of the M alone, with their fits."""
+        ids = self.ids[which]
+        kept = self._samples(lambda values: values[:, which])
+        fits = tuple(fit for fit in self.fits if fit.id in ids)
+        return replace(self, ids=ids, fits=fits, **kept)
+
+    def onto(self, t_s: Floats, rows: Ints) -> Trajectory:
+        """The instants as the rows ``rows`` of longer ``t_s``; NaN and *dropped* in the others."""
+
+        def spread(values: Any) -> Any:
+            none = np.nan if values.dtype.kind == "f" else int(State.DROPPED)
+            out = np.full((t_s.size, *values.shape[1:]), none, values.dtype)
+            out[rows] = values
+            return out
+
+        return replace(self, t_s=t_s, **self._samples(spread))
+
+    def _samples(self, change: Callable[[Any], Any]) -> dict[str, Any]:
+        kept = {name: change(getattr(self, name)) for name in _SAMPLES}
+        rig = self.sigma_rig_mm
+        return {**kept, "sigma_rig_mm": None if rig is None else change(rig)}
 
     def samples(self, marker_id: int) -> Samples:
         """The displacement of one marker from its mean position, at its own times, mm."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -24,10 +24,6 @@ from olivevib.vibration import Line, Phase, Spectrum, Survey, Vibration
 from olivevib.vibration.verdict import SWAY_HZ
 
 BAND = 4.0  # times the highest line: what of a spectrum is worth drawing
-_ROWS = (  # what of a trajectory has one row an instant
-    *("t_s", "sample_t_s", "xyz_mm", "sigma_xyz_mm", "covariance_mm2"),
-    *("rotation_rad", "sigma_rotation_rad", "state", "epipolar_px"),
-)
 
 
 @dataclass(frozen=True)
@@ -104,9 +100,7 @@ class ReportContent:
         if path is None or not self.continuous or not steady:
             return path
         kept = (path.t_s >= steady[0].start_s) & (path.t_s <= steady[-1].end_s)
-        rows = {name: getattr(path, name)[kept] for name in _ROWS}
-        rig = None if path.sigma_rig_mm is None else path.sigma_rig_mm[kept]
-        return replace(path, **rows, sigma_rig_mm=rig) if kept.sum() > 1 else path
+        return path.rows(kept) if kept.sum() > 1 else path
 
     @property
     def frames(self) -> int:

@@ -4,22 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
-from olivevib.arrays import Floats, Ints
+from olivevib.arrays import Floats
 from olivevib.errors import UsageError
 from olivevib.reconstruction.trajectory import Trajectory
-from olivevib.signals import State
 
 ALIKE = 1e-3  # steps that differ by less than this part of a step are equal
 FEWEST_STEPS = 4  # equal steps that make a grid
 MOST_OFF = 0.1  # of a step: farther from its row no frame may lie
-_ROWS = (
-    *("sample_t_s", "xyz_mm", "sigma_xyz_mm", "covariance_mm2"),
-    *("rotation_rad", "sigma_rotation_rad", "epipolar_px"),
-)
 
 
 @dataclass(frozen=True)
@@ -81,7 +75,7 @@ def even_part(trajectory: Trajectory) -> EvenPart:
         first, beyond = _finest_stretch(t_s)
         if beyond - first > FEWEST_STEPS and (first, beyond) != (0, t_s.size):
             return replace(
-                _on_grid(_rows(trajectory, np.arange(first, beyond))), whole=False, span_s=span
+                _on_grid(trajectory.rows(np.arange(first, beyond))), whole=False, span_s=span
             )
     return replace(_on_grid(trajectory), span_s=span)
 
@@ -119,27 +113,6 @@ def _on_grid(trajectory: Trajectory) -> EvenPart:
     even = trajectory
     if rows[-1] + 1 > t_s.size:
         grid = start + slope * np.arange(rows[-1] + 1)
-        even = _spread(trajectory, rows, grid)
+        grid[rows] = t_s
+        even = trajectory.onto(grid, rows)
     return EvenPart(even, 1.0 / float(slope), float(start), True, float(t_s[-1] - t_s[0]))
-
-
-def _rows(trajectory: Trajectory, rows: Ints) -> Trajectory:
-    values: dict[str, Any] = {name: getattr(trajectory, name)[rows] for name in (*_ROWS, "state")}
-    rig = trajectory.sigma_rig_mm
-    kept = None if rig is None else rig[rows]
-    return replace(trajectory, t_s=trajectory.t_s[rows], sigma_rig_mm=kept, **values)
-
-
-def _spread(trajectory: Trajectory, rows: Ints, grid: Floats) -> Trajectory:
-    """The samples in ``rows`` of ``grid``, NaN and *dropped* elsewhere."""
-    values: dict[str, Any] = {}
-    for name in (*_ROWS, "sigma_rig_mm"):
-        had = getattr(trajectory, name)
-        if had is not None:
-            values[name] = np.full((grid.size, *had.shape[1:]), np.nan)
-            values[name][rows] = had
-    state = np.full((grid.size, trajectory.ids.size), int(State.DROPPED), dtype=np.int64)
-    state[rows] = trajectory.state
-    t_s = grid.copy()
-    t_s[rows] = trajectory.t_s
-    return replace(trajectory, t_s=t_s, state=state, **values)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -74,10 +74,4 @@ def only_markers(trajectory: Trajectory, ids: tuple[int, ...] | None) -> Traject
             "Name ids of that list, or none to export all.",
         )
     pick = np.array([known.index(i) for i in sorted(set(ids))], dtype=np.int64)
-    columns = (
-        *("sample_t_s", "xyz_mm", "sigma_xyz_mm", "covariance_mm2"),
-        *("rotation_rad", "sigma_rotation_rad", "state", "epipolar_px"),
-    )
-    chosen = {name: getattr(trajectory, name)[:, pick] for name in columns}
-    fits = tuple(fit for fit in trajectory.fits if fit.id in ids)
-    return replace(trajectory, ids=trajectory.ids[pick], fits=fits, **chosen)
+    return trajectory.markers(pick)
