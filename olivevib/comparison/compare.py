@@ -12,9 +12,10 @@ from olivevib.comparison.forward import Nuisance, SensorMotion, nuisance, sensor
 from olivevib.comparison.lag import CoarseLag, envelope_offset, fine_lag, offsets_that_overlap
 from olivevib.comparison.lines import line_differences, sensor_lines, steady_limits
 from olivevib.comparison.noise import with_local_noise
-from olivevib.comparison.rival import CLOSE, Rival, angle_deg, borne_out_by, coherence_of, rival_of
+from olivevib.comparison.outcome import Outcome, Told
+from olivevib.comparison.rival import borne_out_by, rival_of
 from olivevib.comparison.settings import DEFAULTS, ComparisonSettings
-from olivevib.comparison.types import Comparison, LineDifference, Verdict
+from olivevib.comparison.types import Comparison, LineDifference
 from olivevib.comparison.views import View, fit_views
 from olivevib.progress import Tick, silent
 from olivevib.signals import Samples
@@ -24,11 +25,7 @@ from olivevib.vibration.verdict import fold
 
 _FEWEST = 30
 _NARROWEST_HZ = 0.3
-_RESEMBLES = 0.8  # correlation below which the two motions are not called the same
-_OPEN_DEG = 8.0  # sigma of the turn from which what is seen across may be noise
-_OPEN_RAD = 1.0  # sigma of a turn that nothing fixes
 _LEAST_LEFT = 0.005  # of the motion's power that taking out the slow part must leave
-_QUARTER = 0.25 / np.sqrt(3)  # of a period: sigma of a lag that may be off by a quarter
 _NO_COLUMNS = Nuisance(np.empty((0, 0)), 0.0)
 
 
@@ -56,12 +53,12 @@ def compare(
     sensor, missing = _axes_that_are(sensor)
     tick(0, 4, "displacement from the accelerometer")
     motion = sensor_motion(sensor, settings.corner_hz)
-    empty = _Outcome.of(marker, sensor_name)
+    outcome = Outcome(marker, sensor_name)
     if camera_s.size < _FEWEST:
-        return empty.undecided(f"The marker was seen in {camera_s.size} frames only.")
+        return outcome.undecided(f"The marker was seen in {camera_s.size} frames only.")
     limits = offsets_that_overlap(camera_s, motion, settings)
     if limits is None:
-        return empty.no_overlap(camera_s, motion)
+        return outcome.no_overlap(camera_s, motion)
     tick(1, 4, "lines of the accelerometer")
     lines = sensor_lines(sensor, 1.5 * settings.corner_hz)
     motion, share_sigma = _localised(motion, lines, settings)
@@ -72,14 +69,25 @@ def compare(
     tick(3, 4, "clock, gain and rotation")
     seen, clock = work.refined(lag.offset_s)
     if seen.t_s.size < _FEWEST:
-        return empty.undecided("Too few frames lie inside the accelerometer's record.")
+        return outcome.undecided("Too few frames lie inside the accelerometer's record.")
     if views:
         clock = work.by_views(seen, clock)
     elif lines.fit is not None:
         clock = with_local_noise(seen, clock, work.line_hz)
     clock = _with_gain_sigma(clock, share_sigma)
     rival = rival_of(work.refined, lag, clock, seen.mm, borne_out)
-    return _comparison(empty, work, lag, seen, clock, rival, work.differences(sensor, clock))
+    told = Told(
+        lag=lag,
+        seen=seen,
+        clock=clock,
+        rival=rival,
+        lines=work.differences(sensor, clock),
+        motion=motion,
+        missing_axes=missing,
+        line_hz=work.line_hz,
+        gain_tolerance=settings.gain_tolerance,
+    )
+    return outcome.decided(told)
 
 
 def _axes_that_are(sensor: Samples) -> tuple[Samples, int]:
@@ -235,171 +243,3 @@ def _no_clock() -> ClockFit:
     return ClockFit(
         np.nan, np.nan, np.nan, nan3, np.full((6, 6), np.nan), none, none, nan3[0], np.nan
     )
-
-
-@dataclass(frozen=True)
-class _Outcome:
-    """A comparison that says nothing yet."""
-
-    marker: int
-    sensor: str
-
-    @classmethod
-    def of(cls, marker: int, sensor: str) -> _Outcome:
-        return cls(marker, sensor)
-
-    def undecided(self, reason: str) -> Comparison:
-        return self.nothing(Verdict.UNDECIDED, reason)
-
-    def no_overlap(self, camera_s: Floats, motion: SensorMotion) -> Comparison:
-        reason = (
-            f"The accelerometer's usable part runs from {motion.start_s:.2f} to "
-            f"{motion.end_s:.2f} s of its own clock, the camera's from {camera_s[0]:.2f} to "
-            f"{camera_s[-1]:.2f} s: within the search there is no common half. Give the expected "
-            "offset between the clocks, or let both run through the whole trial."
-        )
-        return self.nothing(Verdict.NO_OVERLAP, reason)
-
-    def nothing(self, verdict: Verdict, reason: str) -> Comparison:
-        nan = float("nan")
-        return Comparison(
-            marker=self.marker,
-            sensor=self.sensor,
-            clock_offset_s=nan,
-            clock_offset_sigma_s=nan,
-            clock_drift_ppm=nan,
-            clock_drift_sigma_ppm=nan,
-            gain=nan,
-            gain_sigma=nan,
-            R_camera_sensor=np.full((3, 3), nan),
-            rotation_deg=nan,
-            rotation_sigma_deg=nan,
-            coherence=nan,
-            peak=nan,
-            second_peak=nan,
-            lines=(),
-            overlay_t_s=np.empty(0),
-            optical_mm=np.empty((0, 3)),
-            sensor_mm=np.empty((0, 3)),
-            verdict=verdict,
-            reason=reason,
-        )
-
-
-def _comparison(
-    empty: _Outcome,
-    work: _Work,
-    lag: CoarseLag,
-    seen: Seen,
-    clock: ClockFit,
-    rival: Rival,
-    lines: tuple[LineDifference, ...],
-) -> Comparison:
-    sigma = clock.sigma
-    offset_sigma = float(np.hypot(sigma[0], 0.0 if rival.excluded else rival.scatter_s))
-    if work.missing_axes:
-        offset_sigma = float(np.hypot(offset_sigma, _QUARTER / work.line_hz))
-    straight = _is_straight(seen.mm, clock)
-    worst_deg = float(np.degrees(_OPEN_RAD if straight else clock.turn_sigma_rad))
-    angle = angle_deg(clock.R_camera_sensor)
-    coherence = coherence_of(seen.mm, clock.residual_mm)
-    verdict, reason = _verdict(work, lag, clock, coherence)
-    if rival.open and verdict is Verdict.AGREES:
-        verdict, reason = Verdict.UNDECIDED, f"Amplitudes only: {reason[0].lower()}{reason[1:]}"
-    reasons = [reason, *_remarks(work, rival, clock, worst_deg)]
-    return Comparison(
-        marker=empty.marker,
-        sensor=empty.sensor,
-        clock_offset_s=clock.offset_s,
-        clock_offset_sigma_s=offset_sigma,
-        clock_drift_ppm=1e6 * clock.drift,
-        clock_drift_sigma_ppm=1e6 * float(sigma[1]),
-        gain=clock.gain,
-        gain_sigma=float(sigma[2]),
-        R_camera_sensor=clock.R_camera_sensor,
-        rotation_deg=angle if worst_deg < _OPEN_DEG else np.nan,
-        rotation_sigma_deg=worst_deg,
-        coherence=coherence,
-        peak=lag.peak,
-        second_peak=lag.second_peak,
-        lines=lines,
-        overlay_t_s=seen.t_s,
-        optical_mm=seen.mm,
-        sensor_mm=clock.predicted_mm,
-        verdict=verdict,
-        reason=" ".join(reasons),
-        ambiguous=rival.open,
-        rival_offset_s=rival.offset_s if rival.open else np.nan,
-        rival_turn_deg=rival.turn_deg if rival.open else np.nan,
-    )
-
-
-def _is_straight(optical: Floats, clock: ClockFit) -> bool:
-    """True where the motion across its main direction is not the sensor's own: no turn from it.
-
-    What the sensor predicts across may be its noise alone; the camera then sees none of it. Taken
-    as real where the camera sees at least half of it.
-    """
-    main = np.linalg.eigh(clock.predicted_mm.T @ clock.predicted_mm)[1][:, -1]
-    across = clock.predicted_mm - np.outer(clock.predicted_mm @ main, main)
-    size = float(np.sum(across**2))
-    seen = float(np.sum(across * optical)) / size if size > 0 else 0.0
-    return seen < 0.5 * clock.gain
-
-
-def _verdict(work: _Work, lag: CoarseLag, clock: ClockFit, coherence: float) -> tuple[Verdict, str]:
-    r = float(np.sqrt(coherence)) if np.isfinite(coherence) else 0.0
-    if work.missing_axes and r > 0.5:
-        return Verdict.UNDECIDED, (
-            f"The accelerometer has {3 - work.missing_axes} of three axes: the clocks are "
-            f"compared (correlation {r:.2f}), but a gain of {clock.gain:.3f} may be the angle "
-            "between its axes and the motion, and the clock offset is open by up to a quarter "
-            "period: without all axes, the phase of an orbit looks like a lag."
-        )
-    if r < _RESEMBLES:
-        if lag.peak - lag.second_peak < CLOSE or r < 0.5:
-            return Verdict.UNDECIDED, (
-                f"No lag was found at which the two motions resemble one another (correlation "
-                f"{r:.2f}). Check that both belong to this trial and that the sensor sat at the "
-                "marker."
-            )
-        return Verdict.DIFFERS, (
-            f"At the best lag the two motions correlate by {r:.2f} only: the sensor and the "
-            "marker did not move as one body."
-        )
-    off, sigma = clock.gain - 1, float(clock.sigma[2])
-    size = f"{100 * off:+.2f} ± {100 * sigma:.2f} %"
-    if abs(off) <= max(work.settings.gain_tolerance, 3 * sigma):
-        if sigma > work.settings.gain_tolerance:
-            return Verdict.UNDECIDED, f"The gain is known to {100 * sigma:.0f} % only."
-        return Verdict.AGREES, f"Camera and accelerometer agree: gain {size}, correlation {r:.4f}."
-    return Verdict.DIFFERS, (
-        f"The camera's amplitude differs from the accelerometer's by {size} (correlation {r:.4f}): "
-        "check the sensor's scale, the marker's size and the calibration."
-    )
-
-
-def _remarks(work: _Work, rival: Rival, clock: ClockFit, worst_deg: float) -> list[str]:
-    out = []
-    if rival.open:
-        out.append(
-            f"The lag is ambiguous: {1e3 * rival.distance_s:.1f} ms away the two fit as well with "
-            f"the sensor turned by {rival.turn_deg:.0f}° against this (a steady motion repeats "
-            "itself, and half a period is half a turn). Let both record the start of the machine."
-        )
-    elif rival.near:
-        out.append(
-            f"A lag {1e3 * rival.distance_s:.1f} ms away fits almost as well, but is excluded by "
-            + (
-                "what each camera saw of the whole trial."
-                if rival.by_views
-                else "the whole record."
-            )
-        )
-    if worst_deg >= _OPEN_DEG:
-        out.append("The motion is straight: the turn about it is left open.")
-    if work.motion.gaps.size:
-        out.append(f"{len(work.motion.gaps)} gaps in the accelerometer's record were left out.")
-    if work.motion.resampled:
-        out.append("The accelerometer's stamps are uneven; a spline carried it to an even grid.")
-    return out
