@@ -155,8 +155,7 @@ def seen_through(key: Key, W: Floats) -> Floats:
     """W (3, 3) as fitted, without what the drawing's blur does to it.
 
     Through W = 1 + E the drawing's round blur is seen skewed, by v (A A' - 1), A the linear part of
-    W; the camera's is round at any pose. A fit takes the difference for E, less by the share that
-    ``pull`` says.
+    W; the camera's is round at any pose. Of that difference a fit takes ``pull`` for a change of W.
     """
     A = W[:2, :2] - W[:2, 2:] * W[2, :2]
     S = key.template.blur.variance_px2 * (A @ A.T - np.eye(2))

@@ -103,10 +103,6 @@ def judge_board(results: Sequence[CameraResult], coverage: Guidance | None) -> V
     return Verdict(words, math.nan, fits, tuple(cautions))
 
 
-def _cells(coverage: Guidance) -> list[tuple[str, float]]:
-    return sorted(coverage.cells.items())
-
-
 def _fit(stamps_s: Floats) -> StampFit | None:
     return fit_stamps(stamps_s) if stamps_s.size > 1 else None
 
