@@ -1,8 +1,9 @@
-"""What a person types, as values, and a value with its sigma as a person reads it."""
+"""What a person types, as values; counts, lists and values with sigma as a person reads them."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from olivevib.errors import UsageError
@@ -98,6 +99,11 @@ def settings(pairs: list[str]) -> dict[str, Any]:
         except TOMLKitError:
             out[key.strip()] = text.strip()
     return out
+
+
+def listed(names: Sequence[str]) -> str:
+    """``a``, ``a and b``, ``a, b and c``."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def counted(number: int, word: str) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 from olivevib.report.clean import clean
 from olivevib.report.words import count
+from olivevib.values import listed
 
 _WORDS = {"failed": "failed", "missing": "not run", "blocked": "blocked", "stale": "out of date"}
 
@@ -31,7 +32,7 @@ def trouble(name: str, stages: Mapping[str, Any]) -> Trouble | None:
         names = [n for n, told in stages.items() if (told or {}).get("state") == state]
         if names:
             why = clean((stages[names[0]] or {}).get("reason") or "", 300)
-            return Trouble(clean(name, 60), f"{' and '.join(names)} {words}", why)
+            return Trouble(clean(name, 60), f"{listed(names)} {words}", why)
     return None
 
 

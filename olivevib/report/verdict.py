@@ -9,7 +9,8 @@ from olivevib.report.clean import clean
 from olivevib.report.content import ReportContent
 from olivevib.report.lines import KNOWN, MEANING, MOST, OPEN, candidates_text, describe
 from olivevib.report.tables import candidate_accelerations
-from olivevib.report.words import count, listed, measure, number, percent, triple
+from olivevib.report.words import count, measure, number, percent, triple
+from olivevib.values import listed
 from olivevib.vibration import largest
 from olivevib.vibration.types import Line, LineStatus
 

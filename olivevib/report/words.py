@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from olivevib.report.clean import clean
@@ -129,11 +129,6 @@ def fact(key: str, value: Any, digits: int = 6) -> tuple[str, str]:
         parts = [fact("", v, digits)[1] for v in value]
         return words, clean(("; " if nested else ", ").join(parts)) + tail
     return words, clean(value)
-
-
-def listed(names: Sequence[str]) -> str:
-    """``a``, ``a and b``, ``a, b and c``."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def count(n: int, word: str) -> str:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from olivevib.trial.stages import StageState
     from olivevib.trial.trial import Trial
 
 
@@ -27,13 +30,18 @@ class Quality:
     why: str
 
 
-def stage_lines(trial: Trial) -> tuple[StageLine, ...]:
-    """The stages in order; files of the trial are named from its folder on."""
+def stage_lines(
+    trial: Trial, states: Mapping[str, StageState] | None = None
+) -> tuple[StageLine, ...]:
+    """The stages in order; files of the trial are named from its folder on.
+
+    states: those of the trial, where they are known already.
+    """
     here = f"{trial.folder.resolve()}{os.sep}"
     near = f"{trial.folder}{os.sep}"
     return tuple(
         StageLine(name, state.state.value, state.reason.replace(here, "").replace(near, ""))
-        for name, state in trial.states().items()
+        for name, state in (trial.states() if states is None else states).items()
     )
 
 

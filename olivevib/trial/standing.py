@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from olivevib.errors import Caution, OlivevibError
+from olivevib.errors import Caution, InputError, OlivevibError
 from olivevib.trial.stages import (
     BY_NAME,
     STAGES,
@@ -13,11 +13,30 @@ from olivevib.trial.stages import (
     StageState,
     last_fault,
 )
+from olivevib.values import listed
 
 if TYPE_CHECKING:
     from olivevib.trial.trial import Trial
 
 CODES = ("stage-failed", "results-stale", "results-left")  # said before everything else
+
+
+class Fault(NamedTuple):
+    """What keeps a stage from its result: its name, its state, and the error whole."""
+
+    stage: str
+    state: Condition
+    error: OlivevibError
+
+
+def faults(trial: Trial, states: Mapping[str, StageState]) -> tuple[Fault, ...]:
+    """Of the stages that failed, or whose own inputs cannot be read: the errors, each once."""
+    found: dict[str, Fault] = {}
+    for name, state in states.items():
+        error = _error(trial, name, state) if _root(name, states)[0] == name else None
+        if error is not None:
+            found.setdefault(error.what, Fault(name, state.state, error))
+    return tuple(found.values())
 
 
 def old_results(trial: Trial, states: Mapping[str, StageState]) -> dict[str, str]:
@@ -40,8 +59,7 @@ def standing(trial: Trial, states: Mapping[str, StageState] | None = None) -> tu
     states: those of the trial, where they are known already.
     """
     states = trial.states() if states is None else states
-    found = (_fault(trial, name, s) for name, s in states.items() if _root(name, states)[0] == name)
-    out = [caution for caution in found if caution is not None]
+    out = [_said(trial, fault) for fault in faults(trial, states)]
     by_root: dict[str, list[str]] = {}
     for name in old_results(trial, states):
         by_root.setdefault(_root(name, states)[0], []).append(name)
@@ -75,27 +93,27 @@ def _why(name: str, found: StageState) -> str:
     return f"are not shown to be of the trial as it is now ({word}{reason})"
 
 
-def _fault(trial: Trial, name: str, found: StageState) -> Caution | None:
-    """What made a stage fail, or keeps it from running: what, why and remedy; None for neither."""
-    fault: OlivevibError | None = None
+def _error(trial: Trial, name: str, found: StageState) -> OlivevibError | None:
+    """What made a stage fail, or keeps it from running; None for neither."""
     if found.state is Condition.FAILED:
-        fault, word = last_fault(trial.folder, BY_NAME[name]), "failed"
-    elif found.state is Condition.BLOCKED:
-        word = "cannot run"
+        return last_fault(trial.folder, BY_NAME[name]) or InputError(found.reason)
+    if found.state is Condition.BLOCKED:
         try:
             trial.fingerprint(name)
         except OlivevibError as error:
-            fault = error
-    if fault is None:
-        return None
-    text = f"{name} {word}: {fault.what} {fault.why}".strip()
-    return Caution("stage-failed", text, fault.remedy or f"Run: olivevib run {trial.name}")
+            return error
+    return None
+
+
+def _said(trial: Trial, fault: Fault) -> Caution:
+    word = "failed" if fault.state is Condition.FAILED else "cannot run"
+    text = f"{fault.stage} {word}: {fault.error.what} {fault.error.why}".strip()
+    return Caution("stage-failed", text, fault.error.remedy or f"Run: olivevib run {trial.name}")
 
 
 def _old(trial: Trial, root: str, found: StageState, names: list[str]) -> Caution:
     """What is said of the results of ``names``, which are old because of one stage."""
-    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-    text = f"The numbers of {listed} {_why(root, found)}."
+    text = f"The numbers of {listed(names)} {_why(root, found)}."
     if found.state is Condition.SKIPPED:
         remedy = f"Name the input in trial.toml again and run; or delete {BY_NAME[root].file}."
         return Caution("results-left", text, remedy)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from olivevib.reconstruction import Trajectory
     from olivevib.trial import Trial
     from olivevib.trial.quality import StageLine
-    from olivevib.tui.faults import Fault
+    from olivevib.trial.standing import Fault
     from olivevib.tui.views.coverage import Coverage
     from olivevib.tui.views.rig import RigScene
     from olivevib.tui.views.setting_rows import SettingRow
@@ -140,12 +140,13 @@ def trial_row(folder: Path) -> TrialRow:
 def _row(folder: Path) -> TrialRow:
     from olivevib.trial import Trial
     from olivevib.trial.quality import quality_of, stage_lines
-    from olivevib.tui.faults import faults_of
+    from olivevib.trial.standing import faults
 
     trial = Trial.open(folder)
     session, tree = trial.settings.session, trial.settings.tree
     about = [str(part) for part in (session.date, session.place, tree.cultivar) if part]
-    stages = stage_lines(trial)
+    states = trial.states()
+    stages = stage_lines(trial, states)
     quality = quality_of(stages, trial)
     return TrialRow(
         folder,
@@ -157,7 +158,7 @@ def _row(folder: Path) -> TrialRow:
         session.simulated,
         session.archived,
         session.notes,
-        faults_of(trial, stages),
+        faults(trial, states),
     )
 
 
@@ -165,13 +166,14 @@ def trial_facts(folder: Path) -> TrialFacts:
     """What the trial screen shows; raises InputError where the trial cannot be read."""
     from olivevib.trial import Trial
     from olivevib.trial.quality import stage_lines
+    from olivevib.trial.standing import faults
     from olivevib.trial.summary import summary
-    from olivevib.tui.faults import faults_of
 
     trial = Trial.open(folder)
     journal = trial.private / "track.journal"
     resume = "tracking was stopped half way: run goes on from there" if journal.exists() else ""
-    stages = stage_lines(trial)
+    states = trial.states()
+    stages = stage_lines(trial, states)
     found = guarded(lambda: summary(trial))
     return TrialFacts(
         folder,
@@ -182,35 +184,34 @@ def trial_facts(folder: Path) -> TrialFacts:
         found if isinstance(found, OlivevibError) else None,
         resume,
         trial.settings.session.notes,
-        faults_of(trial, stages),
+        faults(trial, states),
     )
 
 
 def results(folder: Path) -> Results:
     """What the result screens draw; raises InputError where the trial cannot be read."""
     from olivevib.trial import Trial
-    from olivevib.trial.quality import stage_lines
+    from olivevib.trial.standing import faults
     from olivevib.trial.summary import summary
-    from olivevib.tui.faults import faults_of
 
     trial = Trial.open(folder)
     marked = {m.id: m.place or "" for m in trial.settings.markers.marker}
     found = (summary(trial), trial.trajectory, trial.vibration, trial.comparison)
-    return Results(folder, *found, marked, faults_of(trial, stage_lines(trial)))
+    return Results(folder, *found, marked, faults(trial, trial.states()))
 
 
 def calibration_facts(folder: Path) -> CalibrationFacts:
     """What the calibration page shows; raises InputError where a file cannot be read."""
     from olivevib.trial import Trial
-    from olivevib.trial.quality import stage_lines
+    from olivevib.trial.standing import faults
     from olivevib.trial.summary import summary
-    from olivevib.tui.faults import faults_of
     from olivevib.tui.views.coverage import Coverage, camera_places
 
     trial = Trial.open(folder)
     record, rig, facts = trial.calibration, trial.rig, summary(trial)
     if record is None or rig is None:
-        return CalibrationFacts(facts, faults=faults_of(trial, stage_lines(trial)[:1]))
+        known = faults(trial, trial.states())
+        return CalibrationFacts(facts, faults=tuple(f for f in known if f.stage == "calibrate"))
     points = (record.residuals_left, record.residuals_right)
     sizes = (rig.left.size_px, rig.right.size_px)
     return CalibrationFacts(

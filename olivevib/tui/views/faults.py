@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.style import Style
 from rich.text import Text
 
 from olivevib.errors import OlivevibError
-from olivevib.tui.faults import Fault
 from olivevib.tui.harmless import harmless
 from olivevib.tui.views.palette import Palette
+
+if TYPE_CHECKING:
+    from olivevib.trial.standing import Fault
 
 
 def error_text(error: OlivevibError | None) -> Text:

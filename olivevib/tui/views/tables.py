@@ -18,7 +18,7 @@ from olivevib.values import with_sigma
 
 if TYPE_CHECKING:
     from olivevib.comparison import Comparison
-    from olivevib.tui.faults import Fault
+    from olivevib.trial.standing import Fault
 
 STATE_MEANINGS = {"done": "good", "stale": "warn", "failed": "bad", "blocked": "warn"}
 QUALITY_MEANINGS = {
