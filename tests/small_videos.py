@@ -87,3 +87,11 @@ def damage(path: Path, packet: int, share: float = 0.5, count: int = 12) -> Path
     broken = path.with_name(f"broken{packet}_" + path.name)
     broken.write_bytes(data)
     return broken
+
+
+def recordings(folder: Path) -> Path:
+    """A workspace with two short recordings, left.avi and right.avi, and no trial yet."""
+    for side in ("left", "right"):
+        make_video(folder / f"{side}.avi", frames=4)
+    (folder / "trials").mkdir()
+    return folder

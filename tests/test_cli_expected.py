@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from small_videos import make_video
+from small_videos import recordings
 
 from olivevib import pipeline
 from olivevib.cli import main
@@ -70,10 +70,7 @@ def test_show_where_no_trial_is_says_so_and_what_to_do(tmp_path, monkeypatch, ca
 
 @pytest.fixture
 def trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    for side in ("left", "right"):
-        make_video(tmp_path / f"{side}.avi", frames=4)
-    (tmp_path / "trials").mkdir()
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.chdir(recordings(tmp_path))
     new_trial(Path("trials/T1"), NewTrial("left.avi", "right.avi"))
     return tmp_path / "trials" / "T1"
 

@@ -6,7 +6,7 @@ import socket
 from pathlib import Path
 
 import pytest
-from small_videos import make_video
+from small_videos import recordings
 
 from olivevib.cli import main
 from olivevib.errors import UsageError
@@ -21,10 +21,7 @@ from olivevib.trial.workspace import named
 @pytest.fixture
 def raw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A workspace with two short recordings; the current folder."""
-    for side in ("left", "right"):
-        make_video(tmp_path / f"{side}.avi", frames=4)
-    (tmp_path / "trials").mkdir()
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.chdir(recordings(tmp_path))
     return tmp_path
 
 

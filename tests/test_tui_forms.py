@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pytest
@@ -30,10 +29,9 @@ def two(tmp_path_factory) -> Path:
 
 @pytest.fixture
 def workspace(two, tmp_path, monkeypatch) -> Path:
-    shutil.copytree(two, tmp_path / "olive")
-    monkeypatch.chdir(tmp_path / "olive")
-    Trial.open(tmp_path / "olive/trials/A4").changed({"markers.size_mm": 100.0})  # written last
-    return tmp_path / "olive"
+    folder = scene.at_work(two, tmp_path, monkeypatch)
+    Trial.open(folder / "trials/A4").changed({"markers.size_mm": 100.0})  # written last
+    return folder
 
 
 def row_of(app, name: str) -> str:

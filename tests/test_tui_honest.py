@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,9 +35,7 @@ def measured(tmp_path_factory) -> Path:
 
 @pytest.fixture
 def workspace(measured, tmp_path, monkeypatch) -> Path:
-    shutil.copytree(measured, tmp_path / "olive")
-    monkeypatch.chdir(tmp_path / "olive")
-    return tmp_path / "olive"
+    return scene.at_work(measured, tmp_path, monkeypatch)
 
 
 def flat(text: str) -> str:

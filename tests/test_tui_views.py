@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from rich.cells import cell_len
 from tui_app import lines
 
 from olivevib.pipeline.export_preview import ExportPreview, Gap
+from olivevib.tui.loader import Results, shades
 from olivevib.tui.views.axes import Frame
 from olivevib.tui.views.cells import Cells, braille_values, polyline, scatter
 from olivevib.tui.views.motion import MotionPlot, motion_plot, window
@@ -409,3 +411,25 @@ def test_outputs_say_what_where_and_what_is_missing_in_them():
     again = preview_text(Output("pdf", "report.pdf", "made"), None, PLAIN).plain
     assert "Enter writes it again" in again
     assert "none: every marker" in gap_words(replace(found, gaps=()))
+
+
+def test_the_spectrogram_of_a_fitted_motion_holds_lines_above_half_the_frame_rate():
+    """25 Hz at 30 frames/s, 240 instants a second: as in the report, sway left out."""
+    t_s = np.arange(960) / 240.0
+    path = scene.trajectory()
+    n, m = t_s.size, path.ids.size
+    xyz = np.tile(path.xyz_mm[:1], (n, 1, 1))
+    xyz[:, :, 0] += (3 * np.sin(2 * np.pi * 25 * t_s) + 9 * np.sin(2 * np.pi * 0.5 * t_s))[:, None]
+    fine = replace(
+        path.rows(np.zeros(n, np.int64)),
+        t_s=t_s,
+        sample_t_s=np.repeat(t_s[:, None], m, axis=1),
+        xyz_mm=xyz,
+        method="continuous",
+    )
+    found = Results(Path("T04"), {}, trajectory=fine, sway_hz=2.5)
+    plot = shades(found, int(path.ids[0]), "1")
+    assert "fitted motion" in plot.title
+    assert plot.f_hz[0] > 2.5
+    strongest = plot.f_hz[np.argmax(np.nanmean(plot.power, axis=1))]
+    assert strongest == pytest.approx(25.0, abs=0.5)

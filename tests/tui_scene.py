@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import av
 import cv2
 import numpy as np
+import pytest
 
 from olivevib.comparison import Comparison, LineDifference, Verdict
 from olivevib.errors import Caution, InputError
@@ -239,6 +241,13 @@ def new_trial(folder: Path, toml: str = TOML) -> Path:
     for name in ("left.avi", "right.avi", "accelerometer.csv"):
         (folder / name).write_bytes(b"not decoded in these tests")
     write_rig(folder / "shared_rig.toml", rig(), {})
+    return folder
+
+
+def at_work(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of a workspace that was made once, as the current folder."""
+    folder = shutil.copytree(made, tmp_path / "olive")
+    monkeypatch.chdir(folder)
     return folder
 
 

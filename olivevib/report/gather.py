@@ -19,8 +19,7 @@ from olivevib.report.season import SeasonEntry
 from olivevib.report.season_table import trial_rows
 from olivevib.trial.stages import STAGES
 from olivevib.trial.summary import summary
-from olivevib.vibration import SamplingFacts
-from olivevib.vibration.verdict import SWAY_HZ
+from olivevib.vibration.verdict import sway_below
 
 if TYPE_CHECKING:
     from olivevib.trial import Trial
@@ -32,7 +31,7 @@ _RECORD = ("session", "tree", "machine", "outcome", "markers", "cameras", "accel
 
 def content_of(trial: Trial) -> ReportContent:
     """Everything that the report of ``trial`` shows; None and () where a stage has not run."""
-    settings, tracks, band = trial.settings, trial.tracks, trial.settings.vibration.band_hz
+    settings, tracks = trial.settings, trial.tracks
     fit = trial.reconstruction.motion if trial.reconstruction else None
     facts = within(trial.folder, summary(trial))
     return ReportContent(
@@ -49,7 +48,7 @@ def content_of(trial: Trial) -> ReportContent:
         vibration=trial.vibration,
         comparisons=trial.comparison,
         cautions=tuple(Caution(w["code"], w["text"], w["remedy"]) for w in facts["warnings"]),
-        sway_hz=SamplingFacts(2 * SWAY_HZ, band_hz=band).sway_hz if band else SWAY_HZ,
+        sway_hz=sway_below(settings.vibration.band_hz),
         next_time=() if fit is None else fit.next_time,
         provenance=provenance(trial),
     )

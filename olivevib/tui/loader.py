@@ -80,6 +80,7 @@ class Results:
     comparisons: tuple[Comparison, ...] = ()
     places: Mapping[int, str] = field(default_factory=dict)
     faults: tuple[Fault, ...] = ()
+    sway_hz: float = 0.0  # slower motion counts as sway
 
 
 @dataclass(frozen=True)
@@ -193,11 +194,13 @@ def results(folder: Path) -> Results:
     from olivevib.trial import Trial
     from olivevib.trial.standing import faults
     from olivevib.trial.summary import summary
+    from olivevib.vibration.verdict import sway_below
 
     trial = Trial.open(folder)
     marked = {m.id: m.place or "" for m in trial.settings.markers.marker}
     found = (summary(trial), trial.trajectory, trial.vibration, trial.comparison)
-    return Results(folder, *found, marked, faults(trial, trial.states()))
+    sway_hz = sway_below(trial.settings.vibration.band_hz)
+    return Results(folder, *found, marked, faults(trial, trial.states()), sway_hz)
 
 
 def calibration_facts(folder: Path) -> CalibrationFacts:
@@ -259,18 +262,25 @@ def camera_lines() -> tuple[CameraLine, ...]:
 
 def shades(found: Results, marker: int, name: str) -> ShadePlot | None:
     """The spectrogram of one marker, the same as in the report; None for too short a record."""
+    from olivevib.report.content import ReportContent
     from olivevib.report.figures.spectrogram import spectrogram
     from olivevib.tui.views.of_results import bands_of
     from olivevib.tui.views.spectrogram import ShadePlot
 
-    rate = found.summary["timing"]["left"]["frame_rate_hz"]
-    path = found.trajectory
-    if path is None or not rate or marker not in path.ids:
+    content = ReportContent(
+        found.folder.name,
+        trajectory=found.trajectory,
+        vibration=found.vibration,
+        sway_hz=found.sway_hz,
+    )
+    path = content.shown_path
+    if path is None or marker not in path.ids:
         return None
-    one = spectrogram(path, marker, rate / 2)
+    one = spectrogram(path, marker, content.shown_hz, content.sway_hz)
     if one is None:
         return None
-    title = f"marker {name} · displacement, as sampled"
+    how = "of the fitted motion" if content.continuous else "as sampled"
+    title = f"marker {name} · displacement, {how}, above {content.sway_hz:g} Hz"
     return ShadePlot(title, one.t_s, one.f_hz, one.power, bands_of(found.vibration))
 
 

@@ -27,6 +27,11 @@ SWAY_HZ = 2.5  # slower than this at the frame rate, a line looks like sway
 MIRROR_HZ = 0.3  # nearer than this to half the rate, a line is its own mirror
 
 
+def sway_below(band_hz: tuple[float, float] | None) -> float:
+    """Below this, Hz, a motion counts as sway: half the band's lower end, at most 2.5 Hz."""
+    return SWAY_HZ if band_hz is None else min(SWAY_HZ, 0.5 * band_hz[0])
+
+
 @dataclass(frozen=True)
 class SamplingFacts:
     """What is known of when and how often the markers were seen.
@@ -63,8 +68,8 @@ class SamplingFacts:
 
     @property
     def sway_hz(self) -> float:
-        """Below this a motion counts as sway: half the band's lower end, at most 2.5 Hz."""
-        return min(SWAY_HZ, 0.5 * self.band_hz[0])
+        """Below this a motion counts as sway."""
+        return sway_below(self.band_hz)
 
     def evidence(self) -> tuple[str, ...]:
         """What in the recording could tell aliases apart, in words; empty: nothing."""
