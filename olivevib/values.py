@@ -111,6 +111,11 @@ def counted(number: int, word: str) -> str:
     return f"{number or 'no'} {word}{'s' * (number != 1)}"
 
 
+def combined(sigma: float | None, other: float | None) -> float | None:
+    """Sigma of two independent parts together; None where the first is not known."""
+    return None if sigma is None else math.hypot(sigma, other or 0.0)
+
+
 def with_sigma(value: float, sigma: float | None, digits: int) -> str:
     """Value ± sigma with two significant digits of sigma, at most seven decimals.
 

@@ -19,7 +19,7 @@ from olivevib.tui.views.of_results import orbits_of
 from olivevib.tui.views.old import old_words
 from olivevib.tui.views.palette import Palette
 from olivevib.tui.views.tables import facts_text, marker_row
-from olivevib.tui.views.words import alone, with_spread
+from olivevib.tui.views.words import alone, marker_frequency, with_spread
 
 SIZES = pytest.mark.parametrize("size", [(120, 40), (80, 24)], ids=["120x40", "80x24"])
 FAULT = scene.FAULT
@@ -138,7 +138,8 @@ def marker(size: float, sigma: float) -> dict[str, object]:
     axes = dict.fromkeys("xyz", size)
     return {
         "id": 3, "place": "trunk", "seen_fraction": 1.0, "frequency_hz": 25.0,
-        "frequency_sigma_hz": 0.01, "frequency_status": "direct", "frequency_candidates_hz": [],
+        "frequency_sigma_hz": 0.01, "frequency_clock_sigma_hz": 0.00125,
+        "frequency_status": "direct", "frequency_candidates_hz": [],
         "amplitude_mm": axes, "amplitude_sigma_mm": dict.fromkeys("xyz", sigma),
         "displacement_pp_mm": 2 * size, "displacement_pp_sigma_mm": 2 * sigma,
         "acceleration_rms_m_s2": 30.0,
@@ -186,3 +187,14 @@ def test_cameras_in_step_are_said_to_be_in_step():
     )
     assert "cameras in step (0.0 ms apart)" in step
     assert "cameras 9.3 ms apart ·" in apart
+
+
+def test_a_frequency_reads_as_in_show_its_clock_included(measured):
+    from olivevib.cli.summary_text import frequency
+    from olivevib.trial.summary import summary
+
+    markers = summary(Trial.open(measured / "trials/T04"))["markers"]
+    assert markers
+    for told in markers:
+        assert marker_frequency(told) == frequency(told)
+        assert marker_frequency({**told, "frequency_clock_sigma_hz": 0.1}) != frequency(told)

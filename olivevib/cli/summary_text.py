@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from olivevib.trial.standing import CODES
-from olivevib.values import with_sigma
+from olivevib.values import combined, with_sigma
 
 CANDIDATES_SHOWN = 5
 
@@ -169,8 +169,7 @@ def frequency(m: dict[str, Any]) -> str:
     if status is None:
         return "not analysed"
     if m["frequency_hz"] is not None:
-        sigma, clock = m["frequency_sigma_hz"], m["frequency_clock_sigma_hz"]
-        both = None if sigma is None else math.hypot(sigma, clock or 0.0)
+        both = combined(m["frequency_sigma_hz"], m["frequency_clock_sigma_hz"])
         return f"{with_sigma(m['frequency_hz'], both, 4)} Hz, {status}"
     candidates = list(dict.fromkeys(round(f, 2) for f in m["frequency_candidates_hz"]))
     if status == "blind" or not candidates:  # candidates of sway are no frequencies

@@ -60,5 +60,4 @@ def describe(line: Line) -> str:
         return f"{line.status}: {candidates_text(line.candidates_hz or (line.f_hz,))}"
     if not np.isfinite(line.f_hz):
         return str(line.status)
-    sigma = float(np.hypot(line.f_sigma_hz, line.f_clock_sigma_hz))
-    return f"{measure(line.f_hz, 'Hz', sigma)} ({line.status})"
+    return f"{measure(line.f_hz, 'Hz', line.f_total_sigma_hz)} ({line.status})"

@@ -62,6 +62,11 @@ class Line:
         """What the camera's crystal may add to f_sigma_hz: common to all markers and trials."""
         return CRYSTAL * self.f_hz
 
+    @property
+    def f_total_sigma_hz(self) -> float:
+        """Of the fit and of the camera's own clock together."""
+        return float(np.hypot(self.f_sigma_hz, self.f_clock_sigma_hz))
+
     def __post_init__(self) -> None:
         for name in ("amplitude", "amplitude_sigma", "phase_rad"):
             object.__setattr__(self, name, floats(name, getattr(self, name), (3,), nan=True))

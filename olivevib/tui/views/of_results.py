@@ -121,7 +121,7 @@ def marks_of(line: Line, rate_hz: float) -> tuple[Mark, ...]:
     if line.status is LineStatus.NONE or not np.isfinite(f_hz):
         return ()
     decided = line.status in DECIDED
-    words = frequency(line.f_hz, line.f_sigma_hz, line.status, line.candidates_hz)
+    words = frequency(line.f_hz, line.f_total_sigma_hz, line.status, line.candidates_hz)
     seen = folded(f_hz, rate_hz)
     if decided and abs(seen - f_hz) > 1e-6:
         words += f" (seen at {seen:.2f} Hz)"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from olivevib.values import with_sigma
+from olivevib.values import combined, with_sigma
 
 GLYPHS = {
     "done": "●",
@@ -62,10 +62,10 @@ def frequency(
 
 
 def marker_frequency(marker: Mapping[str, Any]) -> str:
-    """The frequency of a marker of the summary."""
+    """The frequency of a marker of the summary, ± of the fit and of the camera's own clock."""
     return frequency(
         marker["frequency_hz"],
-        marker["frequency_sigma_hz"],
+        combined(marker["frequency_sigma_hz"], marker["frequency_clock_sigma_hz"]),
         marker["frequency_status"],
         marker["frequency_candidates_hz"],
     )
