@@ -25,7 +25,8 @@ class MarkerTruth:
 
     seen: share of the frames in which it was found by both cameras. lateral_mm: rms across the
     line of sight, a coordinate; depth_mm along it; sigma ratios: rms error over predicted sigma.
-    frequency and amplitude (largest axis) with their sigmas; NaN where not measured.
+    frequency (sigma with the camera's clock) and amplitude (largest axis) with their sigmas; NaN
+    where not measured.
     """
 
     id: int
@@ -143,7 +144,7 @@ def _marker(
         z_depth=_rms(error[:, 2] / sigma[:, 2]),
         status=row.line.status.value if row else "not analysed",
         f_hz=row.line.f_hz if row else float("nan"),
-        f_sigma_hz=row.line.f_sigma_hz if row else float("nan"),
+        f_sigma_hz=row.line.f_total_sigma_hz if row else float("nan"),
         true_f_hz=float(fact.get("frequency_hz", float("nan"))),
         amplitude_mm=amplitude,
         amplitude_sigma_mm=amplitude_sigma,
