@@ -10,7 +10,7 @@ import pytest
 from test_motion_parts import anchor_of, scene
 
 from olivevib.reconstruction.continuous import decided
-from olivevib.reconstruction.motion import Anchor, MotionSettings, fit_motion, steady_ends
+from olivevib.reconstruction.motion import Anchor, MotionSettings, fit_motion
 from olivevib.reconstruction.motion.decide import Facts, decide, zone
 from olivevib.reconstruction.motion.evaluate import phase_of
 from olivevib.reconstruction.motion.offset import Lines, with_offset
@@ -218,32 +218,6 @@ def test_a_gain_of_the_blur_scales_amplitudes_and_widens_their_sigma():
     assert refused.status is LineStatus.CONFIRMED
 
 
-class GrowingScene(Scene):
-    """A shaker whose amplitude grows by a third from start to end."""
-
-    def motion(self, marker, t_s):
-        slow = replace(self, amplitude=np.zeros_like(self.amplitude))
-        own = Scene.motion(self, marker, t_s) - Scene.motion(slow, marker, t_s)
-        size = 1 + 0.3 * (t_s / self.span_s - 0.5)
-        return Scene.motion(slow, marker, t_s) + size[..., None] * own
-
-
-def test_a_growing_amplitude_is_followed():
-    s = GrowingScene(**vars(scene(25.3)))
-    _, fit = fitted(s, settings=NEAR)
-    assert fit.status is LineStatus.CONFIRMED
-    assert fit.growth == pytest.approx(0.15, abs=0.02)
-    assert fit.chi2 < 1.3
-    at = np.linspace(0.2, 3.8, 300)
-    error = fit.evaluate(at).xyz_mm[:, 0] - s.motion(0, at)[:, :3]
-    error -= error.mean(axis=0)
-    assert error[:, :2].std() < 0.04
-    e = 1e-4
-    bend = (s.motion(0, at + e) - 2 * s.motion(0, at) + s.motion(0, at - e))[:, :3] / e**2 * 1e-3
-    difference = fit.evaluate(at).acceleration_m_s2[:, 0] - bend
-    assert difference[:, :2].std() < 0.02 * np.abs(bend).max()
-
-
 def test_frames_too_far_apart_for_any_knots_are_refused_in_words(monkeypatch):
     monkeypatch.setattr("olivevib.reconstruction.motion.pixels.SPACINGS_S", ())
     with pytest.raises(ValueError, match="too few for a fit"):
@@ -362,37 +336,6 @@ def test_a_wandering_speed_that_is_not_that_of_the_pictures_is_told():
     decision = decide(replace(facts, stray="it strays"), fit.anchor, MotionSettings())
     assert decision.status is LineStatus.SUPPORTED
     assert "it strays" in decision.reasons[0]
-
-
-def stopping(s: Scene, stop_s: float) -> Scene:
-    """The same machine, whose speed falls to nothing within 0.3 s of stop_s."""
-
-    class Stopping(Scene):
-        def phase(self, t_s):
-            late = np.clip(t_s - stop_s, 0.0, 0.3)
-            return 2 * np.pi * self.f_hz * (np.minimum(t_s, stop_s) + late - late**2 / 0.6)
-
-    return Stopping(**{f.name: getattr(s, f.name) for f in fields(Scene)})
-
-
-@pytest.mark.parametrize("f_hz", [10.703, 30.847])  # seen at 10.7 Hz, and at 0.85 Hz as sway is
-def test_a_shut_down_at_the_end_is_cut_from_the_steady_record(f_hz):
-    s = stopping(scene(f_hz, mm=2.0, offset_s=0.0105, kind="steady", span_s=5.0), 4.6)
-    seen = sight(s, rig(), np.random.default_rng(0))
-    ends = steady_ends(seen)
-    assert ends is not None
-    for span in (ends.left, ends.right):
-        assert span[0] == pytest.approx(0.0, abs=0.02)
-        assert 4.2 < span[1] < 4.65
-    fit = fit_motion(ends.of(seen), rig(), anchor_of(s))
-    assert abs(fit.f_hz - f_hz) < 5e-3
-    assert fit.chi2 < 1.3
-
-
-def test_nothing_is_cut_from_a_record_that_is_steady_to_its_ends():
-    for f_hz in (10.703, 25.3, 30.847):
-        s = scene(f_hz, mm=2.0, kind="steady", span_s=5.0)
-        assert steady_ends(sight(s, rig(), np.random.default_rng(0))) is None
 
 
 def test_an_offset_is_not_clear_where_the_slow_curves_never_agree():

@@ -21,7 +21,10 @@ BIN_S = 0.1
 FAR = 4.0  # rms of an end's bin over that of the usual bin: it is no part of the steady motion
 LONGEST_S = 1.0  # that is cut at an end; what misses for longer is no ramp
 SHORTEST_S = 2.0  # that must be left
-ROUNDS = 12
+ROUNDS = 20
+PARTS = ((1 / 3, 1.0), (0.0, 2 / 3), (1 / 6, 5 / 6))  # of a record that nothing describes whole
+CLEAN = 2.0  # noise over the localiser's below which one line and a spline describe a part
+WHOLE_S = 0.5  # so short a cut is made at once, of a longer one half: a ramp spoils its neighbours
 
 Span = tuple[float, float]
 
@@ -32,6 +35,13 @@ class Ends:
 
     left: Span
     right: Span
+
+    def part(self, first: float, last: float) -> Ends:
+        """From a share of the record to another."""
+        (a, b), (c, d) = self.left, self.right
+        return Ends(
+            (a + first * (b - a), a + last * (b - a)), (c + first * (d - c), c + last * (d - c))
+        )
 
     def of(self, observations: Observations) -> Observations:
         """The sightings inside; ValueError where no marker is seen often enough there."""
@@ -51,9 +61,32 @@ def steady_ends(observations: Observations, most_s: float = LONGEST_S) -> Ends |
     """Where the steady motion begins and ends in each camera; None where nothing is to be cut.
 
     most_s: that may be cut at an end; infinite where nobody knows yet when the machine ran: then
-    the longest part that one line and a spline describe is taken.
+    the longest part that one line and a spline describe is taken. Where they describe the whole to
+    nowhere near its noise, and a part of it well, rest or ramps were taken for steady: that part.
     """
-    whole = ends = Ends(_span(observations, "left"), _span(observations, "right"))
+    whole = Ends(_span(observations, "left"), _span(observations, "right"))
+    found = _cut(observations, whole, most_s)
+    if found is not None or _scatter(observations, whole) < CLEAN:
+        return found
+    parts = [whole.part(*share) for share in PARTS]
+    parts = [_cut(observations, part, np.inf) or part for part in parts]
+    scatter = [_scatter(observations, part) for part in parts]
+    best = int(np.argmin(scatter))
+    return parts[best] if scatter[best] < CLEAN else None
+
+
+def _scatter(observations: Observations, ends: Ends) -> float:
+    """Noise inside over the localiser's; infinite where that cannot be told."""
+    try:
+        seen = look(ends.of(observations), None, 2)
+    except ValueError:
+        return float("inf")
+    return seen.scale if seen.peaks_hz else float("inf")
+
+
+def _cut(observations: Observations, whole: Ends, most_s: float) -> Ends | None:
+    """The part of ``whole`` that one line and a spline describe; None: all of it, or none."""
+    ends = whole
     for _ in range(ROUNDS):
         try:
             inside = ends.of(observations)
@@ -68,7 +101,7 @@ def steady_ends(observations: Observations, most_s: float = LONGEST_S) -> Ends |
         )
         if shorter == ends:
             return None if ends == whole else ends
-        ends = shorter
+        ends = Ends(_nearer(ends.left, shorter.left), _nearer(ends.right, shorter.right))
         left = np.array([ends.left, ends.right])
         cut = np.abs(left - [whole.left, whole.right])
         if cut.max() > most_s or np.ptp(left, axis=1).min() < SHORTEST_S:
@@ -94,6 +127,14 @@ def _described(markers: tuple[MarkerSightings, ...], side: str, peak_hz: float, 
     first, last = max(zip(steps[::2], steps[1::2], strict=True), key=lambda run: run[1] - run[0])
     first, last = first + (first > 0), last - (last < count)
     return float(edges[first]), float(edges[max(last, first + 1)])
+
+
+def _nearer(now: Span, asked: Span) -> Span:
+    """Each end moved to what is asked if that is near, else half the way."""
+    first, last = (
+        b if abs(b - a) <= WHOLE_S else 0.5 * (a + b) for a, b in zip(now, asked, strict=True)
+    )
+    return first, last
 
 
 def _span(observations: Observations, side: str) -> Span:

@@ -20,6 +20,7 @@ from olivevib.reconstruction.motion.finish import (
     with_gain_sigma,
 )
 from olivevib.reconstruction.motion.free import fit_free
+from olivevib.reconstruction.motion.growth import growth_of, told_growth, with_growth_sigma
 from olivevib.reconstruction.motion.offset import WEAK_S
 from olivevib.reconstruction.motion.prepare import (
     time_prior,
@@ -41,7 +42,7 @@ from olivevib.reconstruction.motion.types import (
     MotionFit,
     MotionSettings,
 )
-from olivevib.reconstruction.motion.wander import growth_of, pace_of, weigh_paces
+from olivevib.reconstruction.motion.wander import pace_of, weigh_paces
 
 DRAWING_SHARE = 1e-3  # of a row time: so well, down to 32 px, a fitted drawing tells a slant
 NEAR_S = 4e-3  # sigma of an offset that a fit found a valley away from its start
@@ -147,15 +148,15 @@ def misfit(ready: Prepared, model: Model, branch: Branch) -> float:
     return chi2_of(model, branch) * ready.pixels.scale**2
 
 
-def table_of(ready: Prepared, weighed: br.Weighed, chi2: float) -> BranchTable:
-    """The branch table, log evidence divided by chi2 where that is above 1."""
+def table_of(ready: Prepared, weighed: br.Weighed, chi2: float, f_hz: float) -> BranchTable:
+    """The branch table, log evidence divided by chi2 where that is above 1; f_hz: of the best."""
     rows = weighed.branches
     evidence = np.array([b.evidence for b in rows]) / max(1.0, chi2)
     evidence = evidence - evidence[0]
     share = np.exp(evidence - evidence.max())
     scale = np.array([b.theta[3] for b in rows]) / (ready.anchor.left_row_time_s or np.nan)
     return BranchTable(
-        np.array([b.theta[0] for b in rows]),
+        np.array([f_hz, *(b.theta[0] for b in rows[1:])]),
         evidence,
         share / share.sum(),
         np.array([b.theta[1] for b in rows]),
@@ -173,14 +174,15 @@ def finished(
     """Motions, covariance, verdict."""
     model, best = fitted
     chi2 = chi2_of(model, best)
-    table = table_of(ready, weighed, chi2)
     scale = max(1.0, chi2) * ready.pixels.learned
     plain = (False,) * ready.settings.harmonics
     markers, timing = markers_of(model, best, ready.observations, ready.poses, plain, scale)
     strongest = max(markers, key=lambda m: float(np.abs(m.cosine[0] + 1j * m.sine[0])[:3].max()))
     amplitude = np.abs(strongest.cosine[0] + 1j * strongest.sine[0])[:3]
-    facts = Facts(
-        table=table,
+    grown = told_growth(model, best, scale) if kind == "steady" and not model.growth else None
+    f_hz = float((best if grown is None else grown.branch).theta[0])
+    facts = Facts(  # of the even fit in all but the frequency: a growth may also hide a misfit
+        table=table_of(ready, weighed, chi2, f_hz),
         rate_hz=ready.observations.frame_rate_hz,
         span_s=ready.end_s - ready.start_s,
         offset_s=float(best.theta[1]),
@@ -197,6 +199,10 @@ def finished(
         row_sigmas=_row_sigmas(ready.anchor, best.theta[3:5]),
     )
     decision = decide(facts, ready.anchor, ready.settings)
+    if grown is not None:
+        model, best = grown.model, grown.branch
+        parts = markers_of(model, best, ready.observations, ready.poses, plain, scale)
+        markers, timing = with_growth_sigma(parts, grown)
     return _result(ready, model, best, facts, decision, (markers, timing, kind))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from olivevib.arrays import Floats
 from olivevib.geometry import StereoRig
 from olivevib.reconstruction.motion import branches as br
+from olivevib.reconstruction.motion.growth import Growth
 from olivevib.reconstruction.motion.offset import with_offset
 from olivevib.reconstruction.motion.pixels import Pixels, look
 from olivevib.reconstruction.motion.prepare import (
@@ -24,7 +25,6 @@ from olivevib.reconstruction.motion.types import (
     Anchor,
     MotionSettings,
 )
-from olivevib.reconstruction.motion.wander import Growth
 
 SAME = 0.02  # of a cycle over the record: two candidates are one; alike ones of two kinds are not
 

@@ -30,7 +30,6 @@ TEMPER = 60.0  # largest drop of log evidence that a window may claim
 PSI_KNOT_S = 0.5
 PSI_SIGMA_RAD = 2.0
 POLISH_STEPS = 25
-GROWTH_STEPS = 6
 GAUGE_RAD = 1e-3  # mean and slope of the phase belong to amplitudes and frequency
 
 
@@ -243,40 +242,6 @@ class PixelLine:
             J = J - basis @ (basis.T @ J)
             H, h = H + J.T @ J / noise, h + J.T @ rest[:, k] / noise
         return H, h
-
-
-@dataclass(frozen=True)
-class Growth:
-    """Share by which the amplitude grows from mid_s to its end, half_s later; gain as in Pace."""
-
-    share: float
-    mid_s: float
-    half_s: float
-    gain: float
-
-    def size(self, t_s: Floats) -> Floats:
-        """Amplitude over the mean one."""
-        return np.asarray(1.0 + self.share * (t_s - self.mid_s) / self.half_s)
-
-
-def growth_of(
-    observations: Observations, knot_s: float, span: tuple[float, float], steady_hz: float
-) -> Growth:
-    """How evenly growing the amplitude is, from the pixels alone (no branch yet)."""
-    mid, half = 0.5 * (span[0] + span[1]), 0.5 * (span[1] - span[0])
-    lines = [PixelLine.of(v, knot_s) for v in views_of(observations)]
-    share, steady, left = 0.0, 0.0, 0.0
-    for k in range(GROWTH_STEPS):
-        top = bottom = left = 0.0
-        for line in lines:
-            phase = 2 * np.pi * steady_hz * (line.t_s - mid)
-            u = (line.t_s - mid) / half
-            slope, rest = line.growing(phase, u, share)
-            top, bottom = top + float(np.sum(slope * rest)), bottom + float(np.sum(slope**2))
-            left += float(np.sum(rest**2))
-        steady = left if k == 0 else steady
-        share = float(np.clip(share + top / max(bottom, 1e-12), -0.8, 0.8))
-    return Growth(share, mid, half, steady / max(left, 1e-12))
 
 
 def weigh_paces(
