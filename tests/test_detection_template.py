@@ -12,7 +12,9 @@ from test_detection_paper import LIBRARY, PLACES, no_marker, places, scene
 
 from olivevib.detection.blur import PIXEL_VARIANCE, Blur
 from olivevib.detection.card_fit import fit_card
+from olivevib.detection.domains import Bars
 from olivevib.detection.fitted_points import point_jacobian
+from olivevib.detection.hypotheses import frame_hypotheses
 from olivevib.detection.pixels import marker_pixels
 from olivevib.detection.refine import fit_template
 from olivevib.detection.template import card, draw_template
@@ -191,6 +193,28 @@ def test_steep_and_small_markers_are_found_and_measured(size, tilt):
         assert np.abs(d.corners_px - places(truth[d.id])[1]).max() < 0.15
         assert d.flags == ()
         assert d.localiser == "template"
+
+
+@pytest.mark.parametrize("azimuth", [0, 90, 180, 270])
+def test_of_a_steep_marker_one_line_and_the_blobs_beside_its_ends_are_enough(azimuth):
+    """The other line is lost in the code, and blobs as long as wide point nowhere."""
+    H = pose(11, 96, 80, azimuth, 0, np.array([639.5, 359.5]))
+    ends = np.array([[[-3.5, -5], [3.5, -5]], [[-5, -3.5], [-5, 3.5]], [[5, -3.5], [5, 3.5]]])
+    px = np.array([apply_homography(H, pair) for pair in ends])
+    length = np.linalg.norm(px[:, 1] - px[:, 0], axis=1)
+    if length[0] < length[1]:  # tilted the other way: the upright bars are the long ones
+        px = np.array([apply_homography(H, pair[:, ::-1]) for pair in ends])
+        length = np.linalg.norm(px[:, 1] - px[:, 0], axis=1)
+    axis = (px[:, 1] - px[:, 0]) / length[:, None]
+    axis[1:] = [np.sqrt(0.5), np.sqrt(0.5)]
+    length[1:], width = 11.0, np.array([1.7, 10.0, 10.0])
+    bars = Bars(px.mean(axis=1), axis, length, width, length * width, np.arange(3))
+    frames = frame_hypotheses(bars, LIBRARY.layout)
+    off = np.linalg.norm(frames.centre - [639.5, 359.5], axis=1)
+    best = frames.only(off < 3.0)
+    assert len(best) == 1
+    area = np.linalg.det(np.stack([best.a[0], best.b[0]]))
+    assert area == pytest.approx((96 / 11) ** 2 * np.cos(np.radians(80)), rel=0.1)
 
 
 @pytest.mark.parametrize("turn", [0, 90, 180, 270])

@@ -21,7 +21,7 @@ from olivevib.studies.detection.canvas import (
     pose,
 )
 from olivevib.studies.detection.readers import Seen, everyone, ours
-from olivevib.studies.detection.scenes import Cell, lower_limit, score, single
+from olivevib.studies.detection.scenes import Cell, full_pictures, lower_limit, score, single
 from olivevib.studies.detection.weather import covered, smoothed_noise
 from olivevib.studies.factorial import FACTORS, mean_effects
 
@@ -162,3 +162,11 @@ def test_prints_have_their_corners_where_the_pose_says():
     assert light[50, int(corners[0, 0]) + 2] == pytest.approx(40, abs=1)
     assert light[50, int(corners[0, 0]) - 2] == pytest.approx(210, abs=1)
     assert light[50, int(corners[0, 0])] == pytest.approx(125, abs=10)  # the edge halves a pixel
+
+
+def test_markers_at_80_degrees_are_found():
+    """Lines 1.5 px thick: one of the two is often lost in the code."""
+    seen = full_pictures(ours(), Cell(96.0, (80.0, 80.0)), 45, lambda k: Effort().draws(1, 88, k))
+    assert seen.share == 1.0
+    assert seen.wrong == 0
+    assert seen.silent == 0

@@ -1,8 +1,10 @@
 """Location bars to hypotheses of a marker: two of the four bars are enough.
 
 Two opposite bars, or two adjacent ones, fix an affine frame: centre and the images a, b of one
-module to the right and down. Bars found where a hypothesis expects them support it. A false
-hypothesis costs a reading of its code; none is refused for want of a third bar.
+module to the right and down. Under a steep view two bars are thin lines, of which blur joins one
+to the code, and the others are blobs without a direction: one line and the blobs beside its ends
+will do. Bars found where a hypothesis expects them support it. A false hypothesis costs a reading
+of its code; none is refused for want of a third bar.
 """
 
 from __future__ import annotations
@@ -22,6 +24,9 @@ SLENDER = 1.8  # its length over its thickness
 LENGTHS = 1.3  # ratio of two opposite bars, at most
 PLACE = (0.11, 0.6)  # a bar's centroid is within .11 lengths + .6 px of its place
 SINE = 0.25  # between adjacent bars, at least
+THIN = (9.0, 20.0)  # length over thickness, and length in px, of a line under a steep view
+BESIDE = (2.5, 0.35)  # blobs lie 2.5 thicknesses to .35 lengths from the line of such a bar
+EVEN = (0.2, 0.1, 0.3)  # of what is expected: distance of blobs, their slant and shift in lengths
 
 
 @dataclass(frozen=True)
@@ -65,11 +70,12 @@ def frame_hypotheses(bars: Bars, layout: MarkerLayout) -> Frames:
     """Every frame that two opposite or two adjacent bars found, best supported first."""
     founders = (bars.length >= SHORTEST_PX) & (bars.length >= SLENDER * bars.width)
     few = bars.only(founders)
-    if len(few) < 2:
+    if not len(few):
         none = np.empty((0, 2))
         return Frames(none, none, none, np.empty(0, np.int64))
     i, j = _neighbours(few)
-    frames = joined([_opposite(few, i, j, layout), _adjacent(few, i, j, layout)])
+    parts = [_opposite(few, i, j, layout), _adjacent(few, i, j, layout), _steep(bars, layout)]
+    frames = joined(parts)
     frames = _clockwise(frames)
     support = _support(frames, bars, layout)
     frames = Frames(frames.centre, frames.a, frames.b, support)
@@ -126,6 +132,42 @@ def _adjacent(bars: Bars, i: Ints, j: Ints, layout: MarkerLayout) -> Frames:
     corner = bars.centre[i] + ahead[keep, None] * bars.axis[i]
     a, b = (bars.centre[i] - corner) / half, (bars.centre[j] - corner) / half
     return Frames(bars.centre[i] + bars.centre[j] - corner, a, b, np.full(i.size, 2))
+
+
+def _steep(bars: Bars, layout: MarkerLayout) -> Frames:
+    """A thin bar and two domains of any shape where the bars beside its ends are."""
+    half = (layout.modules - 1) / 2
+    thin = np.flatnonzero((bars.length >= THIN[0] * bars.width) & (bars.length >= THIN[1]))
+    tree = cKDTree(bars.centre, balanced_tree=False, compact_nodes=False)
+    near = tree.query_ball_point(bars.centre[thin], 1.2 * bars.length[thin], return_sorted=False)
+    of = np.repeat(thin, [len(n) for n in near])
+    blob = np.fromiter(itertools.chain.from_iterable(near), np.int64, of.size)
+    L, axis, d = bars.length[of], bars.axis[of], bars.centre[blob] - bars.centre[of]
+    along, across = (axis * d).sum(axis=1) / L, _cross(axis, d) / L
+    keep = (np.abs(across) * L > BESIDE[0] * bars.width[of]) & (np.abs(across) < BESIDE[1])
+    keep &= bars.length[blob] < 0.6 * L
+    of, blob, along, across = of[keep], blob[keep], along[keep], across[keep]
+    first, last = _each_with_each(of, along < 0)
+    apart = 2 * half / layout.bar
+    keep = np.abs(along[last] - along[first] - apart) < EVEN[0] * apart
+    keep &= across[first] * across[last] > 0
+    keep &= np.abs(across[first] - across[last]) < EVEN[1]
+    keep &= np.abs(along[first] + along[last]) / 2 < EVEN[2]
+    first, last = first[keep], last[keep]
+    one, other = bars.centre[blob[first]], bars.centre[blob[last]]
+    centre = (one + other) / 2
+    b = (centre - bars.centre[of[first]]) / half
+    return Frames(centre, (other - one) / (2 * half), b, np.full(first.size, 3))
+
+
+def _each_with_each(group: Ints, left: Bools) -> tuple[Ints, Ints]:
+    """All pairs of a left and a right member of the same group, as places in ``group`` (rising)."""
+    lefts, rights = np.flatnonzero(left), np.flatnonzero(~left)
+    start = np.searchsorted(group[rights], group[lefts], side="left")
+    count = np.searchsorted(group[rights], group[lefts], side="right") - start
+    first = np.repeat(lefts, count)
+    step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    return first, rights[np.repeat(start, count) + step]
 
 
 def _clockwise(frames: Frames) -> Frames:
