@@ -226,10 +226,13 @@ def cautions_of(trust: Trust | None) -> tuple[Caution, ...]:
 
 def swapped(trust: Trust) -> InputError:
     """The error for recordings whose markers fit the rig with left and right exchanged."""
+    named = f"miss the epipolar lines by {trust.epipolar_px:.1f} px"
+    if trust.behind > 0.5:
+        named = "would stand behind the cameras"
     return InputError(
         "the recordings of the trial are swapped: left is right.",
-        "Its markers fit the calibrated pair with left and right exchanged "
-        f"(to {trust.exchanged_px:.1f} px), and not as the recordings are named.",
+        f"As they are named, the markers {named}; with left and right exchanged they fit the "
+        f"calibrated pair to {trust.exchanged_px:.2g} px.",
         "Exchange [cameras.left] and [cameras.right] in trial.toml (video, stamps, row time), and "
         "run again; if it was the board's recordings that were swapped, exchange those.",
     )
