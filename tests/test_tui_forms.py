@@ -116,12 +116,16 @@ async def test_the_list_goes_to_its_ends_and_tells_that_enter_opens(workspace, s
             assert words in footer
 
 
-async def test_a_row_drawn_before_its_column_was_widened_is_drawn_again(workspace):
+@pytest.mark.parametrize("new", [False, True])
+async def test_a_row_drawn_before_its_column_was_widened_is_drawn_again(workspace, new):
     async with started(workspace) as (app, pilot):
         await press(pilot, "enter")
         table = app.screen.query_one("#stages", DataTable)
         long = "x" * 40
-        table.update_cell_at(Coordinate(0, 1), long, update_width=True)
+        if new:
+            table.add_row("", long)
+        else:
+            table.update_cell_at(Coordinate(0, 1), long, update_width=True)
         for y in range(table.size.height):
             table.render_line(y)  # as the screen may, before the table is idle
         await settle(pilot)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 from textual.widgets import DataTable
-from textual.widgets._data_table import CellKey
+from textual.widgets._data_table import CellKey, RowKey
 
 
 class RowTable(DataTable[object]):
@@ -20,12 +21,20 @@ class RowTable(DataTable[object]):
     def __init__(self, *, id: str, zebra_stripes: bool = False) -> None:
         super().__init__(id=id, classes="pane", cursor_type="row", zebra_stripes=zebra_stripes)
 
-    def _update_column_widths(self, updated_cells: set[CellKey]) -> None:
-        """Widen the columns; lines that were drawn with the old widths are drawn again.
+    # Textual (8.2.8) widens columns when it is idle, for new rows and for changed cells, and keeps
+    # the lines that were drawn before: such a row stayed cut.
 
-        Textual keeps such lines (8.2.8): a row drawn between update and idle stayed cut.
-        """
+    def _update_column_widths(self, updated_cells: set[CellKey]) -> None:
+        """Widen the columns for changed cells; what was drawn before is drawn again."""
         super()._update_column_widths(updated_cells)
+        self._draw_again()
+
+    def _update_dimensions(self, new_rows: Iterable[RowKey]) -> None:
+        """Widen the columns for new rows; what was drawn before is drawn again."""
+        super()._update_dimensions(new_rows)
+        self._draw_again()
+
+    def _draw_again(self) -> None:
         self._clear_caches()
         self.refresh()
 
