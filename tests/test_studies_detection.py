@@ -133,7 +133,7 @@ FEWER = {  # cells of each study that all of its goals still need
     accuracy: {"SIZES_PX": (24, 48), "TILTS_DEG": (0, 60), "PSF_PX": (0.4, 1.5)},
     hardship: {"PATHS_PX": (0.0, 9.0)},
     clutter: {},
-    speed: {},
+    speed: {"COUNTS": (0, 10, 30), "REPEATS": 1},
     follow: {
         "SIZES_PX": (48,), "TILTS_DEG": (0, 75), "REACH_DEG": {48: 80},
         "PATHS_PX": (9.0, 12.0, 18.0, 24.0), "SPEED_MARKERS": 3,
