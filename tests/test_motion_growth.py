@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_motion_parts import anchor_of, scene
 
-from olivevib.reconstruction.motion import MotionSettings, fit_motion
+from olivevib.reconstruction.motion import MotionSettings, fit_motion, uneven_words
 from olivevib.studies.blind_scenes import Scene, rig, sight
 from olivevib.vibration.types import LineStatus
 
@@ -34,6 +34,8 @@ def test_a_growing_amplitude_is_followed():
     fit = fitted(s)
     assert fit.status is LineStatus.CONFIRMED
     assert fit.growth == pytest.approx(0.15, abs=0.02)
+    (told,) = uneven_words(fit)
+    assert told.startswith("The amplitude grows by 3")  # 35 % = 1.15 / 0.85 - 1
     assert fit.chi2 < 1.3
     at = np.linspace(0.2, 3.8, 300)
     error = fit.evaluate(at).xyz_mm[:, 0] - s.motion(0, at)[:, :3]
@@ -63,3 +65,12 @@ def test_the_growths_own_sigma_widens_what_it_moves():
     assert even.growth == 0.0
     assert grown.timing.sigma("frequency_hz") > 1.2 * even.timing.sigma("frequency_hz")
     assert grown.branches.f_hz[0] == grown.f_hz
+
+
+def test_a_wandering_speed_is_told_and_an_even_run_needs_no_words():
+    even = fitted(scene(25.3))
+    assert uneven_words(even) == ()
+    wandering = fitted(scene(21.3, kind="wandering"))
+    (told,) = uneven_words(wandering)
+    assert told.startswith("The speed wanders from 20.")
+    assert "to 21." in told

@@ -11,7 +11,7 @@ import numpy as np
 from olivevib.errors import Caution
 from olivevib.reconstruction.continuous import DECIDED, FINER, MOST_CHI2, decided, interval_s
 from olivevib.reconstruction.motion import MarkerMotion as FittedMarker
-from olivevib.reconstruction.motion import MotionFit
+from olivevib.reconstruction.motion import MotionFit, uneven_words
 from olivevib.signals import Samples
 from olivevib.vibration import (
     CandidateMotion,
@@ -130,7 +130,8 @@ def _line(line: Line, fit: MotionFit, marker: FittedMarker | None, derivative: i
         return replace(told, **_UNKNOWN)
     if not decided(fit):
         return told
-    base = replace(told, unit="mm", **_amplitudes(fit, marker))
+    reasons = (*fit.reasons, *uneven_words(fit), *fit.next_time)
+    base = replace(told, unit="mm", reasons=reasons, **_amplitudes(fit, marker))
     if derivative == 0:
         return base
     scaled = scaled_line(base, derivative)

@@ -2,6 +2,7 @@
 
 from olivevib.reconstruction.motion.drawing import Pattern
 from olivevib.reconstruction.motion.ends import steady_ends
+from olivevib.reconstruction.motion.evaluate import uneven_words
 from olivevib.reconstruction.motion.fit import fit_motion
 from olivevib.reconstruction.motion.observe import observe
 from olivevib.reconstruction.motion.ratio import FittedRatio, fitted_ratio
@@ -33,4 +34,5 @@ __all__ = [
     "fitted_ratio",
     "observe",
     "steady_ends",
+    "uneven_words",
 ]

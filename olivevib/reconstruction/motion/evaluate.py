@@ -9,6 +9,8 @@ from olivevib.geometry import rotation_from_vector, vector_from_rotation
 from olivevib.reconstruction.motion.spline import ORDER, Knots, knots_over
 from olivevib.reconstruction.motion.types import MarkerMotion, Motion, MotionFit
 
+TOLD_GROWTH = 0.005  # of the mean, from the middle to an end: less is not worth a word
+
 
 def knots_of(fit: MotionFit) -> Knots:
     """The knots of the sway."""
@@ -25,6 +27,24 @@ def phase_of(fit: MotionFit, t_s: Floats) -> tuple[Floats, Floats, Floats]:
         values = [psi.values(fit.psi[:, None], t_s, d)[:, 0] for d in range(3)]
         phi, rate, bend = phi + values[0], rate + values[1], bend + values[2]
     return phi, rate, bend
+
+
+def uneven_words(fit: MotionFit) -> tuple[str, ...]:
+    """What one frequency and one amplitude leave unsaid of how the machine ran."""
+    words = []
+    if abs(fit.growth) >= TOLD_GROWTH:
+        percent = 100 * abs((1 + fit.growth) / (1 - fit.growth) - 1)
+        verb = "grows" if fit.growth > 0 else "shrinks"
+        words.append(
+            f"The amplitude {verb} by {percent:.2g} % from start to end; "
+            "that of the middle is given."
+        )
+    if fit.psi.size:
+        f_hz = phase_of(fit, np.linspace(fit.start_s, fit.end_s, 200))[1] / (2 * np.pi)
+        words.append(
+            f"The speed wanders from {f_hz.min():.2f} to {f_hz.max():.2f} Hz; the mean is given."
+        )
+    return tuple(words)
 
 
 def evaluate(fit: MotionFit, t_s: Floats) -> Motion:
