@@ -7,7 +7,7 @@ import pytest
 
 from olivevib.geometry import apply_homography
 from olivevib.studies import Effort
-from olivevib.studies.detection import accuracy, clutter, follow, hardship, speed
+from olivevib.studies.detection import accuracy, clutter, follow, hardship, speed, throughput
 from olivevib.studies.detection.bound import centre_bound_px
 from olivevib.studies.detection.canvas import (
     CLEAR,
@@ -134,6 +134,7 @@ FEWER = {  # cells of each study that all of its goals still need
     hardship: {"PATHS_PX": (0.0, 9.0)},
     clutter: {},
     speed: {"COUNTS": (0, 10, 30), "REPEATS": 1},
+    throughput: {"LEAST_S": 1.0, "REPEATS": 1},
     follow: {
         "SIZES_PX": (48,), "TILTS_DEG": (0, 75), "REACH_DEG": {48: 80},
         "PATHS_PX": (9.0, 12.0, 18.0, 24.0), "SPEED_MARKERS": 3,
@@ -142,7 +143,10 @@ FEWER = {  # cells of each study that all of its goals still need
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("run", [accuracy.run, hardship.blur, clutter.run, speed.run, follow.run])
+@pytest.mark.parametrize(
+    "run",
+    [accuracy.run, hardship.blur, clutter.run, speed.run, follow.run, throughput.run],
+)
 def test_small_runs_measure_every_goal(run, monkeypatch):
     """Every way and every goal of a study on a few of its cells."""
     (module,) = (m for m in FEWER if m.__name__ == run.__module__)

@@ -59,6 +59,7 @@ BENCHMARKS: tuple[Entry, ...] = (
     Entry("detection-follow", "priors, motion blur and time in tracking", "detection.follow:run"),
     Entry("detection-clutter", "false markers in leaf clutter", "detection.clutter:run"),
     Entry("detection-speed", "CPU time of a full scan, beside peers", "detection.speed:run"),
+    Entry("detection-track", "pairs a second through two videos", "detection.throughput:run"),
     Entry("exposure", "what the exposure takes from an amplitude", "exposure:run"),
     Entry("timing", "frequency, motion and clocks above the frame rate, rendered", "timing:run"),
     Entry("report", "time and size of reports and exports", "seasons.report:run"),

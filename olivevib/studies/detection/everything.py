@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from olivevib.progress import Tick
-from olivevib.studies.detection import accuracy, clutter, follow, hardship, honesty, rates, speed
+from olivevib.studies.detection import (
+    accuracy,
+    clutter,
+    follow,
+    hardship,
+    honesty,
+    rates,
+    speed,
+    throughput,
+)
 from olivevib.studies.study import Effort, Study
 
 PARTS = (
     *(rates.run, accuracy.run, honesty.run, hardship.occlusion, hardship.blur, hardship.light),
-    *(clutter.run, follow.run, speed.run),
+    *(clutter.run, follow.run, speed.run, throughput.run),
 )
 
 

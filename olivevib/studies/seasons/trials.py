@@ -18,7 +18,7 @@ ARUCO = "aruco:DICT_4X4_50"
 RIG = "shared_rig.toml"
 
 
-def ten_markers(folder: Path, seconds: float, tick: Tick) -> Trial:
+def ten_markers(folder: Path, seconds: float, tick: Tick, library: str = ARUCO) -> Trial:
     """A trial with ten markers and an accelerometer, recorded and not measured yet."""
     sample = scenario("sample")
     shaking = Phases(0.12 * seconds, 0.08 * seconds, 0.8 * seconds, 0.05 * seconds)
@@ -26,7 +26,7 @@ def ten_markers(folder: Path, seconds: float, tick: Tick) -> Trial:
         sample,
         seconds=seconds,
         what=Shaking(11.3, shaking, sway_mm=0.6, decay_mm=2.0),
-        markers=MarkerPlan(ARUCO, tuple(range(1, 11)), (66.0, 74.0), (0.0, 35.0)),
+        markers=MarkerPlan(library, tuple(range(1, 11)), (66.0, 74.0), (0.0, 35.0)),
     )
     return _trial(folder, plan, tick)
 
