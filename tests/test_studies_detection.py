@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -174,3 +176,11 @@ def test_markers_at_80_degrees_are_found():
     assert seen.share == 1.0
     assert seen.wrong == 0
     assert seen.silent == 0
+
+
+def test_a_smeared_marker_is_found_by_its_two_sharp_bars_however_it_is_tilted():
+    """9 px of motion leave two opposite bars; at 50 deg they are 2.2 of their lengths apart."""
+    cell = Cell(48.0, (0.0, 50.0), replace(Look(), motion_px=(9.0, 0.0)))
+    seen = full_pictures(ours(), cell, 96, np.random.default_rng)
+    assert seen.share == 1.0
+    assert seen.wrong == 0

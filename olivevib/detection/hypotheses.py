@@ -22,6 +22,7 @@ from olivevib.marker import MarkerLayout
 SHORTEST_PX = 4.0  # of a bar that founds a hypothesis
 SLENDER = 1.8  # its length over its thickness
 LENGTHS = 1.3  # ratio of two opposite bars, at most
+FARTHEST = 2.4  # lengths between two bars: 1.43 face on, more where a tilt shortens them
 PLACE = (0.11, 0.6)  # a bar's centroid is within .11 lengths + .6 px of its place
 SINE = 0.25  # between adjacent bars, at least
 THIN = (9.0, 20.0)  # length over thickness, and length in px, of a line under a steep view
@@ -83,9 +84,9 @@ def frame_hypotheses(bars: Bars, layout: MarkerLayout) -> Frames:
 
 
 def _neighbours(bars: Bars) -> tuple[Ints, Ints]:
-    """Pairs i < j closer than 1.8 lengths of the longer one."""
+    """Pairs i < j closer than ``FARTHEST`` lengths of the longer one."""
     tree = cKDTree(bars.centre, balanced_tree=False, compact_nodes=False)
-    near = tree.query_ball_point(bars.centre, 1.8 * bars.length, return_sorted=False)
+    near = tree.query_ball_point(bars.centre, FARTHEST * bars.length, return_sorted=False)
     i = np.repeat(np.arange(len(bars)), [len(n) for n in near])
     j = np.fromiter(itertools.chain.from_iterable(near), np.int64, i.size)
     L = bars.length
@@ -109,8 +110,8 @@ def _opposite(bars: Bars, i: Ints, j: Ints, layout: MarkerLayout) -> Frames:
     apart = np.abs(_cross(along, d))
     shift = np.abs((along * d).sum(axis=1))
     thick = (bars.width[i] + bars.width[j]) / 2
-    keep = (apart > np.maximum(2.5, 3 * thick)) & (apart < np.minimum(22 * thick, 1.75 * L))
-    keep &= (shift < 1.5 * L) & (np.hypot(apart, shift) < 1.8 * L)
+    keep = (apart > np.maximum(2.5, 3 * thick)) & (apart < np.minimum(22 * thick, FARTHEST * L))
+    keep &= (shift < 1.5 * L) & (np.hypot(apart, shift) < FARTHEST * L)
     i, j, u, d = i[keep], j[keep], u[keep], d[keep]
     centre = (bars.centre[i] + bars.centre[j]) / 2
     return Frames(centre, u / layout.bar, d / (layout.modules - 1), np.full(i.size, 2))
