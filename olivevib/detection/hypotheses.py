@@ -27,6 +27,7 @@ PLACE = (0.11, 0.6)  # a bar's centroid is within .11 lengths + .6 px of its pla
 SINE = 0.25  # between adjacent bars, at least
 THIN = (9.0, 20.0)  # length over thickness, and length in px, of a line under a steep view
 BESIDE = (2.5, 0.35)  # blobs lie 2.5 thicknesses to .35 lengths from the line of such a bar
+NEAR = (1.2, 0.6)  # of its lengths: how far their middles may be from its own, how long they are
 EVEN = (0.2, 0.1, 0.3)  # of what is expected: distance of blobs, their slant and shift in lengths
 
 
@@ -68,7 +69,7 @@ def joined(parts: list[Frames]) -> Frames:
 
 
 def frame_hypotheses(bars: Bars, layout: MarkerLayout) -> Frames:
-    """Every frame that two opposite or two adjacent bars found, best supported first."""
+    """Every frame that two bars found, or one and the blobs beside it, best supported first."""
     founders = (bars.length >= SHORTEST_PX) & (bars.length >= SLENDER * bars.width)
     few = bars.only(founders)
     if not len(few):
@@ -140,13 +141,14 @@ def _steep(bars: Bars, layout: MarkerLayout) -> Frames:
     half = (layout.modules - 1) / 2
     thin = np.flatnonzero((bars.length >= THIN[0] * bars.width) & (bars.length >= THIN[1]))
     tree = cKDTree(bars.centre, balanced_tree=False, compact_nodes=False)
-    near = tree.query_ball_point(bars.centre[thin], 1.2 * bars.length[thin], return_sorted=False)
+    reach = NEAR[0] * bars.length[thin]
+    near = tree.query_ball_point(bars.centre[thin], reach, return_sorted=False)
     of = np.repeat(thin, [len(n) for n in near])
     blob = np.fromiter(itertools.chain.from_iterable(near), np.int64, of.size)
     L, axis, d = bars.length[of], bars.axis[of], bars.centre[blob] - bars.centre[of]
     along, across = (axis * d).sum(axis=1) / L, _cross(axis, d) / L
     keep = (np.abs(across) * L > BESIDE[0] * bars.width[of]) & (np.abs(across) < BESIDE[1])
-    keep &= bars.length[blob] < 0.6 * L
+    keep &= bars.length[blob] < NEAR[1] * L
     of, blob, along, across = of[keep], blob[keep], along[keep], across[keep]
     first, last = _each_with_each(of, along < 0)
     apart = 2 * half / layout.bar

@@ -179,9 +179,9 @@ def finished(
     markers, timing = markers_of(model, best, ready.observations, ready.poses, plain, scale)
     strongest = max(markers, key=lambda m: float(np.abs(m.cosine[0] + 1j * m.sine[0])[:3].max()))
     amplitude = np.abs(strongest.cosine[0] + 1j * strongest.sine[0])[:3]
-    grown = told_growth(model, best, scale) if kind == "steady" and not model.growth else None
+    grown = told_growth(model, best, scale) if kind == "steady" else None
     f_hz = float((best if grown is None else grown.branch).theta[0])
-    facts = Facts(  # of the even fit in all but the frequency: a growth may also hide a misfit
+    facts = Facts(  # as weighed, but for the frequency: a growth that is told may hide a misfit
         table=table_of(ready, weighed, chi2, f_hz),
         rate_hz=ready.observations.frame_rate_hz,
         span_s=ready.end_s - ready.start_s,

@@ -77,19 +77,20 @@ class Grown:
 def told_growth(model: Model, best: Branch, scale: float) -> Grown | None:
     """The branch with its amplitudes growing evenly, where that is told by three sigmas.
 
-    scale: of the fit's variances. Newton's method on chi2 with all else settled at each growth.
+    A growth that the pixels showed already (``model.growth``) is refined. scale: of the fit's
+    variances. Newton's method on chi2 with all else settled at each growth.
     """
 
     def at(growth: float, near: Branch) -> Branch:
         return settle(replace(model, growth=growth), near.theta)
 
-    growth, now = 0.0, at(0.0, best)
-    steady = now.chi2
-    for k in range(MOST_MOVES):
+    growth, now = model.growth, at(model.growth, best)
+    even = now.chi2 if growth == 0 else np.inf
+    for _ in range(MOST_MOVES):
         less, more = at(growth - TRIED, now), at(growth + TRIED, now)
         slope = (more.chi2 - less.chi2) / (2 * TRIED)
         bend = (more.chi2 + less.chi2 - 2 * now.chi2) / TRIED**2
-        if bend > 0 and k == 0 and slope**2 / (2 * bend) < TOLD**2 * scale:
+        if bend > 0 and growth == 0 and slope**2 / (2 * bend) < TOLD**2 * scale:
             return None
         move = -slope / bend if bend > 0 else -np.sign(slope)
         if bend > 0 and abs(move) < NEAR * np.sqrt(2 / bend):
@@ -98,7 +99,7 @@ def told_growth(model: Model, best: Branch, scale: float) -> Grown | None:
         now = at(growth, now)
     else:
         return None
-    if steady - now.chi2 < TOLD**2 * scale:
+    if even - now.chi2 < TOLD**2 * scale:
         return None
     share = float(np.sqrt(2 * scale / bend)) / (2 * TRIED)
     return Grown(

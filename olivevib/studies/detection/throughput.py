@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 from olivevib import pipeline
+from olivevib.pipeline.recordings import SIDES
 from olivevib.progress import Tick
 from olivevib.signals import State
 from olivevib.studies.detection.readers import aruco, facts
@@ -25,7 +26,6 @@ SECONDS, LEAST_S = 10.0, 2.0
 REPEATS = 3
 ASKED = 60.0  # pairs a second on two cores: twice real time
 BUSY = 0.1  # cores that others may use before a time of the clock says little
-SIDES = ("left", "right")
 
 
 @dataclass(frozen=True)
@@ -76,10 +76,14 @@ def run(effort: Effort, tick: Tick) -> Study:
                 f"{rate:.0f} pairs/s{disturbed}",
                 rate >= ASKED if rate >= ASKED or quiet else None,
             ),
-            Goal("its processor time over decoding and cv2.aruco", "ratio", f"{ratio:.2f}", True),
             Goal("markers in both videos, share of frames", ">= 0.99", f"{seen:.4f}", seen >= 0.99),
         ),
-        facts=(*facts(), ("frames of each camera", str(pairs)), ("passes", str(REPEATS))),
+        facts=(
+            *facts(),
+            ("frames of each camera", str(pairs)),
+            ("passes", str(REPEATS)),
+            ("processor time over that of decoding and cv2.aruco", f"{ratio:.2f}"),
+        ),
     )
 
 
